@@ -1,0 +1,71 @@
+# Every target sets up its own virtual environment first; `make help` lists them.
+
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+LOCAL  := results/local
+BENCH  ?= $(LOCAL)/bench
+PAPER  ?= $(LOCAL)/paper
+ALL    := --solver all
+
+.DEFAULT_GOAL := help
+.PHONY: help setup bench bench-paper test check perf report clean
+
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+setup: $(VENV)/.done ## a virtual environment with everything, Ipopt included
+
+bench: setup ## Table 1 in a few minutes: swing at 10 and 20 cells, 1% and 10%, 10 steps
+	$(BIN)/strainbench run swing $(ALL) --set resolution=10,20 --set limit=1%,10% \
+		--steps 10 --time-limit 30 --results $(BENCH)
+	$(BIN)/strainbench report --results $(BENCH)
+
+bench-paper: setup ## the paper's whole grid, 100 steps; hours, resumable, 10 minutes a cell at most
+	$(BIN)/strainbench run swing $(ALL) --set resolution=10,20,40,60 --set limit=1%,10% \
+		--steps 100 --time-limit 600 --results $(PAPER)
+	$(BIN)/strainbench report --results $(PAPER)
+
+test: setup ## the tests
+	$(BIN)/python -m pytest -q
+
+check: setup ## format, lint, types, tests
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m pytest -q
+
+perf: setup ## pytest-benchmark on recorded frames; writes $(LOCAL)/perf.json
+	@mkdir -p $(LOCAL)
+	$(BIN)/python -m pytest tests/perf -o addopts= --benchmark-json=$(LOCAL)/perf.json
+
+report: setup ## tables and charts from $(BENCH) again
+	$(BIN)/strainbench report --results $(BENCH)
+
+clean: ## remove the virtual environment and caches, keep every result
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(VENV)/.done: pyproject.toml Makefile
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
+		sys.exit(0 if v >= (3, 11) else f"strainbench needs Python 3.11 or later; $(PYTHON) is {v[0]}.{v[1]}: make PYTHON=python3.11")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev]'
+	@$(MAKE) --no-print-directory ipopt || \
+		echo "Ipopt could not be set up (see above): the ipopt solvers will be unavailable, the rest works."
+	@touch $@
+
+# PyPI has no cyipopt wheel for Linux: build it on the Ipopt inside casadi's wheel, with PyPI's
+# pkgconf (its bare executable: pip's isolated build hides its Python wrapper).
+.PHONY: ipopt
+ipopt:
+	$(BIN)/python -m pip install -q --disable-pip-version-check 'casadi>=3.7' 'pkgconf>=2.3'
+	@set -e; \
+	casadi=$$(cd / && $(abspath $(BIN))/python -c 'import casadi, os; print(os.path.dirname(casadi.__file__))'); \
+	pkgconf=$$(cd / && $(abspath $(BIN))/python -c 'import pkgconf; print(pkgconf.get_executable())'); \
+	tools=$(abspath $(VENV))/ipopt-build; mkdir -p $$tools; ln -sf $$pkgconf $$tools/pkg-config; \
+	printf '%s\n' 'Name: ipopt' 'Description: Ipopt in the casadi wheel' 'Version: 3.14' \
+		"Cflags: -I$$casadi/include/coin-or" "Libs: -L$$casadi -lipopt" > $$tools/ipopt.pc; \
+	PATH=$$tools:$$PATH PKG_CONFIG_PATH=$$tools LDFLAGS="-Wl,-rpath,$$casadi" \
+		$(BIN)/python -m pip install -q --disable-pip-version-check --no-binary cyipopt 'cyipopt>=1.5'; \
+	(cd / && $(abspath $(BIN))/python -c 'import cyipopt')
