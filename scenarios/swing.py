@@ -1,0 +1,39 @@
+"""A square sheet that swings from two corners (Tang et al. 2022, section 5, Table 1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from strainbench.limits import FloatArray
+from strainbench.mesh import square_grid
+from strainbench.problem import IntArray
+from strainbench.scenario import ClothScenario
+
+SIDE = 0.5  # [m]
+
+
+@dataclass(frozen=True)
+class Swing(ClothScenario):
+    """A square sheet that swings from two corners (Tang et al. 2022, section 5, Table 1).
+
+    It starts at rest in the horizontal xz-plane, with two adjacent corners pinned.
+    """
+
+    name = "swing"
+    needs = frozenset({"inertia", "gravity", "membrane", "bending"})
+
+    diagonals: str = "alternating"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.diagonals not in ("alternating", "uniform"):
+            raise ValueError(f"diagonals is {self.diagonals!r}: valid are alternating, uniform")
+
+    def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
+        """See the base class."""
+        rest, elements = square_grid(self.resolution, SIDE, self.diagonals)
+        positions = np.column_stack([rest[:, 0], np.zeros(len(rest)), rest[:, 1]])
+        pinned = np.array([0, self.resolution * (self.resolution + 1)])
+        return rest, elements, positions, pinned

@@ -1,0 +1,27 @@
+"""No projection: the candidate itself (implicit Euler alone, the first row of Table 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from strainbench import Clock, Problem, Solution, Solver
+
+
+@dataclass(frozen=True)
+class NoProjection(Solver):
+    """No projection: the candidate itself (implicit Euler alone, Tang et al. 2022, Table 1)."""
+
+    name = "none"
+
+    def solve(
+        self,
+        problem: Problem,
+        state: None,
+        *,
+        tolerance: float,
+        monitor: Callable[..., None],
+        deadline: Clock,
+    ) -> Solution:
+        """Return the target."""
+        return Solution(problem.target.copy(), "not limited", 0)

@@ -1,0 +1,141 @@
+"""Upper bounds on stretch in material directions (Tang et al. 2022, section 3.1).
+
+A limit is a curve b(alpha) over material angles; a method sees samples of it, one
+constraint ||F d_i|| <= b_i for each sampled direction d_i = (cos alpha_i, sin alpha_i).
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+
+SAME_DIRECTION = 1e-9
+"""Directions whose unit vectors differ by less than this, up to sign, are one direction."""
+
+
+def frozen_array(name: str, values: ArrayLike, ndim: int) -> FloatArray:
+    """A read-only float copy of `values`, or ValueError naming the field, index and value."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name}: not an array of numbers ({error})") from None
+    if array.ndim != ndim:
+        raise ValueError(f"{name}: expected {ndim} dimensions, got shape {array.shape}")
+    bad = np.argwhere(~np.isfinite(array))
+    if len(bad):
+        index = tuple(bad[0].tolist())
+        raise ValueError(f"{name}{list(index)} is {array[index]}: every entry must be finite")
+    array.setflags(write=False)
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class StretchLimits:
+    """Bounds on the stretch ||F d|| of an element in given material directions.
+
+    Parameters
+    ----------
+    directions : (m, dim)
+        Unit vectors in material space; d and -d are one direction.
+    bounds : (m,) or (e, m)
+        Largest stretch allowed in each direction, for all elements or for each.
+        1 is the rest length: 1.01 is a limit of 1% strain.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the index and the value: a bound that is not positive and finite,
+        a direction that is not a unit vector, one that is given twice with different bounds,
+        or shapes that do not match.
+    """
+
+    directions: FloatArray
+    bounds: FloatArray
+
+    def __post_init__(self) -> None:
+        directions = frozen_array("limits.directions", self.directions, 2)
+        bounds = frozen_array("limits.bounds", self.bounds, np.ndim(self.bounds))
+        if len(directions) == 0:
+            raise ValueError("limits.directions: at least one direction is needed")
+        if bounds.ndim not in (1, 2) or bounds.shape[-1] != len(directions):
+            raise ValueError(
+                f"limits.bounds: shape {bounds.shape} does not match {len(directions)} directions; "
+                f"valid are ({len(directions)},) and (elements, {len(directions)})"
+            )
+        for index in np.argwhere(bounds <= 0)[:1]:
+            raise ValueError(
+                f"limits.bounds{index.tolist()} is {bounds[tuple(index)]}: a bound must be above 0"
+            )
+        for row in np.flatnonzero(np.abs(np.linalg.norm(directions, axis=1) - 1) > 1e-6)[:1]:
+            raise ValueError(f"limits.directions[{row}] is {directions[row]}: not a unit vector")
+        keep = _distinct(directions, bounds)
+        for name, array in (("directions", directions[keep]), ("bounds", bounds[..., keep])):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @classmethod
+    def isotropic(cls, bound: float, directions: int = 4) -> StretchLimits:
+        """The same bound in `directions` equally spaced angles in [-pi/2, pi/2) (section 3.1).
+
+        Between the samples the true stretch can reach bound / cos(pi / (2 directions)).
+        """
+        if not isinstance(directions, (int, np.integer)) or directions < 1:
+            raise ValueError(f"directions is {directions!r}: a whole number of at least 1 is valid")
+        angles = -np.pi / 2 + np.pi * np.arange(directions) / directions
+        return cls.sampled(angles, np.full(directions, bound))
+
+    @classmethod
+    def orthotropic(cls, warp: float, weft: float, shear: float) -> StretchLimits:
+        """Bounds along warp (0 degrees), weft (90 degrees) and both diagonals (+-45 degrees)."""
+        angles = np.pi / 4 * np.array([-2, -1, 0, 1])
+        return cls.sampled(angles, [weft, shear, warp, shear])
+
+    @classmethod
+    def sampled(cls, angles: ArrayLike, bounds: ArrayLike) -> StretchLimits:
+        """Any curve, by its samples: `angles` (m,) [rad], `bounds` (m,) or (e, m)."""
+        alpha = frozen_array("limits.angles", angles, 1)
+        directions = np.column_stack([np.cos(alpha), np.sin(alpha)])
+        return cls(directions, np.asarray(bounds, dtype=np.float64))
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> StretchLimits:
+        """A sampled curve from a CSV file with the columns `angle_degrees` and `bound`."""
+        with open(path, newline="") as file:
+            reader = csv.DictReader(file)
+            if not {"angle_degrees", "bound"} <= set(reader.fieldnames or ()):
+                raise ValueError(
+                    f"{path}: columns {reader.fieldnames}; valid are angle_degrees, bound"
+                )
+            rows = []
+            for row in reader:
+                try:
+                    rows.append((float(row["angle_degrees"]), float(row["bound"])))
+                except (TypeError, ValueError):
+                    raise ValueError(
+                        f"{path}, line {reader.line_num}: {row} is not two numbers"
+                    ) from None
+        if not rows:
+            raise ValueError(f"{path}: no samples below the header")
+        angles, bounds = np.array(rows).T
+        return cls.sampled(np.deg2rad(angles), bounds)
+
+
+def _distinct(directions: FloatArray, bounds: FloatArray) -> list[int]:
+    """Indices of the distinct directions: a curve given from -90 to 90 degrees has one twice."""
+    keep: list[int] = []
+    for j, direction in enumerate(directions):
+        cosines = np.abs(directions[keep] @ direction)
+        twins = [k for k, c in zip(keep, cosines, strict=True) if c > 1 - SAME_DIRECTION]
+        if not twins:
+            keep.append(j)
+        elif not np.array_equal(bounds[..., twins[0]], bounds[..., j]):
+            raise ValueError(
+                f"limits.directions[{j}] repeats direction {twins[0]} with another bound"
+            )
+    return keep

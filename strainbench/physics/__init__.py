@@ -1,0 +1,1 @@
+"""The cloth that is stepped between projections: energies, implicit Euler, integrators."""

@@ -1,0 +1,348 @@
+"""The projection that every solver is given (Tang et al. 2022, Eqs. 1-5).
+
+minimise 1/2 ||x - target||_M^2  subject to  ||(G x)_i|| <= b_i  and  x = target at the pins.
+
+The deformation gradient F_e = sum_k x_k B_k is linear in the positions, so each limited
+direction d of each element is one row of a sparse matrix G (rows x vertices), with entries
+B_k . d, that acts on the three coordinates alike.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike, NDArray
+from scipy.sparse.csgraph import dijkstra
+
+from strainbench.limits import FloatArray, StretchLimits, frozen_array
+
+IntArray = NDArray[np.int64]
+
+
+def _index_array(name: str, values: ArrayLike, ndim: int, vertices: int) -> IntArray:
+    """A read-only copy of vertex indices, or ValueError naming the field, index and value."""
+    array = np.array(values)
+    if array.size == 0:
+        array = array.astype(np.int64)
+    if array.ndim != ndim:
+        raise ValueError(f"{name}: expected {ndim} dimensions, got shape {array.shape}")
+    if not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"{name}: vertex indices must be integers, got {array.dtype}")
+    bad = np.argwhere((array < 0) | (array >= vertices))
+    if len(bad):
+        index = tuple(bad[0].tolist())
+        raise ValueError(
+            f"{name}{list(index)} is {array[index]}: valid vertex indices are 0 to {vertices - 1}"
+        )
+    array = array.astype(np.int64)
+    array.setflags(write=False)
+    return array
+
+
+def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, FloatArray]:
+    """Gradients B of the linear shape functions, and the elements' areas or volumes.
+
+    Returns
+    -------
+    gradients : (e, k, dim)
+        F_e = sum_k x_k B_k [1/m] (Tang et al. 2022, appendix A).
+    measures : (e,)
+        Rest area [m^2] of a triangle, rest volume [m^3] of a tetrahedron.
+
+    Raises
+    ------
+    ValueError
+        Naming the first element without area or volume, to working precision.
+    """
+    corners = rest[elements]
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    dim = rest.shape[1]
+    determinant = np.linalg.det(edges)
+    size = np.abs(edges).max(axis=(1, 2), initial=0) ** dim
+    flat = np.flatnonzero(np.abs(determinant) <= 1e-14 * size)
+    if len(flat):
+        word = "area" if dim == 2 else "volume"
+        raise ValueError(
+            f"elements[{flat[0]}] (vertices {elements[flat[0]].tolist()}) has no rest {word}"
+        )
+    inverse = np.linalg.inv(edges)
+    gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
+    return gradients, np.abs(determinant) / (2 if dim == 2 else 6)
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Closest positions to a target in which no limited direction is stretched too far.
+
+    Parameters
+    ----------
+    rest : (n, 2) or (n, 3)
+        Material positions [m] of a surface, or of a volume.
+    elements : (e, 3) or (e, 4)
+        Vertex indices of triangles, or of tetrahedra.
+    target : (n, 3)
+        Candidate positions [m].
+    limits : StretchLimits
+        Upper bounds on stretch.
+    pinned : (p,)
+        Vertices held at their target.
+    mass : (n,), optional
+        Vertex masses [kg], the weights M of the norm; None is the unweighted norm of Eq. 5.
+
+    All arrays are copied and read-only.
+
+    Raises
+    ------
+    ValueError
+        Naming the field, the index and the value.
+    """
+
+    rest: FloatArray
+    elements: IntArray
+    target: FloatArray
+    limits: StretchLimits
+    pinned: IntArray = ()  # type: ignore[assignment]
+    mass: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        def put(name: str, value: object) -> None:
+            object.__setattr__(self, name, value)
+
+        put("rest", frozen_array("rest", self.rest, 2))
+        n, dim = self.rest.shape
+        if dim not in (2, 3):
+            raise ValueError(f"rest: shape {self.rest.shape}; valid are (n, 2) and (n, 3)")
+        put("elements", _index_array("elements", self.elements, 2, n))
+        if len(self.elements) == 0 or self.elements.shape[1] != dim + 1:
+            raise ValueError(
+                f"elements: shape {self.elements.shape}; rest has {dim} coordinates, "
+                f"so (e, {dim + 1}) with at least one element is valid"
+            )
+        put("target", self._checked_target(self.target))
+        put("pinned", self._checked_pins())
+        put("mass", self._checked_mass())
+        if not isinstance(self.limits, StretchLimits):
+            raise ValueError(f"limits: {self.limits!r} is not a StretchLimits")
+        if self.limits.directions.shape[1] != dim:
+            raise ValueError(
+                f"limits.directions: {self.limits.directions.shape[1]} coordinates, "
+                f"but the material space of rest has {dim}"
+            )
+        if self.limits.bounds.ndim == 2 and len(self.limits.bounds) != len(self.elements):
+            raise ValueError(
+                f"limits.bounds: {len(self.limits.bounds)} rows for {len(self.elements)} elements"
+            )
+        put("_shape", shape_gradients(self.rest, self.elements))
+
+    def _checked_target(self, target: ArrayLike) -> FloatArray:
+        array = frozen_array("target", target, 2)
+        if array.shape != (len(self.rest), 3):
+            raise ValueError(
+                f"target: shape {array.shape}, but rest has {len(self.rest)} vertices, "
+                f"so ({len(self.rest)}, 3) is valid"
+            )
+        return array
+
+    def _checked_pins(self) -> IntArray:
+        pins = _index_array("pinned", self.pinned, 1, len(self.rest))
+        values, counts = np.unique(pins, return_counts=True)
+        for vertex in values[counts > 1][:1]:
+            second = np.flatnonzero(pins == vertex)[1]
+            raise ValueError(f"pinned[{second}] is {vertex}: this vertex is pinned already")
+        return pins
+
+    def _checked_mass(self) -> FloatArray | None:
+        if self.mass is None:
+            return None
+        mass = frozen_array("mass", self.mass, 1)
+        if len(mass) != len(self.rest):
+            raise ValueError(f"mass: {len(mass)} entries for {len(self.rest)} vertices")
+        for vertex in np.flatnonzero(mass <= 0)[:1]:
+            raise ValueError(f"mass[{vertex}] is {mass[vertex]}: a mass must be above 0")
+        return mass
+
+    def with_target(self, target: ArrayLike) -> Problem:
+        """The same mesh, limits and pins with other candidate positions (n, 3) [m]."""
+        other = copy.copy(self)
+        object.__setattr__(other, "target", self._checked_target(target))
+        return other
+
+    def tightened(self, margin: float) -> Problem:
+        """The same projection with every bound lowered by `margin`."""
+        other = copy.copy(self)
+        limits = StretchLimits(self.limits.directions, self.limits.bounds - margin)
+        object.__setattr__(other, "limits", limits)
+        other.__dict__.pop("bounds", None)
+        other.__dict__.pop("_reach", None)
+        return other
+
+    @property
+    def vertices(self) -> int:
+        """Number of vertices n."""
+        return len(self.rest)
+
+    @property
+    def rows(self) -> int:
+        """Number of constraints: elements times limited directions."""
+        return len(self.elements) * len(self.limits.directions)
+
+    @property
+    def gradients(self) -> FloatArray:
+        """(e, k, dim) shape function gradients B [1/m]: F_e = sum_k x_k B_k."""
+        gradients: FloatArray = self._shape[0]  # type: ignore[attr-defined]
+        return gradients
+
+    @property
+    def measures(self) -> FloatArray:
+        """(e,) rest areas [m^2] of triangles, or volumes [m^3] of tetrahedra."""
+        measures: FloatArray = self._shape[1]  # type: ignore[attr-defined]
+        return measures
+
+    @cached_property
+    def free(self) -> IntArray:
+        """Indices of the vertices that are not pinned."""
+        return np.setdiff1d(np.arange(self.vertices), self.pinned)
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """(n,) diagonal of M: the masses, or ones."""
+        return np.ones(self.vertices) if self.mass is None else self.mass
+
+    @property
+    def least_weight(self) -> float:
+        """Smallest weight of a free vertex: ||d||^2 <= ||d||_M^2 / least_weight."""
+        return float(np.min(self.weights[self.free], initial=np.inf))
+
+    @cached_property
+    def edge_length(self) -> float:
+        """Mean rest length of the elements' edges [m]: the problem's own length unit."""
+        corners = self.rest[self.elements]
+        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+
+    @cached_property
+    def row_vertices(self) -> IntArray:
+        """(rows, k) vertices of each row of G; row e m + j is element e, direction j."""
+        return np.repeat(self.elements, len(self.limits.directions), axis=0)
+
+    @cached_property
+    def row_coefficients(self) -> FloatArray:
+        """(rows, k) entries B_k . d of each row of G [1/m]."""
+        per_element: FloatArray = np.einsum("ekc,mc->emk", self.gradients, self.limits.directions)
+        return per_element.reshape(self.rows, -1)
+
+    @cached_property
+    def G(self) -> sp.csr_array:  # noqa: N802
+        """(rows, n) sparse: (G x)_i = F_e d, the deformed direction of constraint i."""
+        k = self.elements.shape[1]
+        return sp.csr_array(
+            (
+                self.row_coefficients.ravel(),
+                self.row_vertices.ravel(),
+                np.arange(0, self.rows * k + 1, k),
+            ),
+            shape=(self.rows, self.vertices),
+        )
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """(rows,) largest stretch b_i of each row of G."""
+        shape = (len(self.elements), len(self.limits.directions))
+        return np.broadcast_to(self.limits.bounds, shape).reshape(-1).copy()
+
+    def stretches(self, positions: FloatArray) -> FloatArray:
+        """(rows,) stretch ||(G x)_i|| of every limited direction at `positions` (n, 3)."""
+        stretches: FloatArray = np.linalg.norm(self.G @ positions, axis=1)
+        return stretches
+
+    def violations(self, positions: FloatArray) -> FloatArray:
+        """(rows,) max(0, ||(G x)_i|| - b_i)."""
+        return np.maximum(0.0, self.stretches(positions) - self.bounds)
+
+    def deformation_gradients(self, positions: FloatArray) -> FloatArray:
+        """(e, 3, dim) F_e at `positions` (n, 3)."""
+        F: FloatArray = np.einsum("ekx,ekc->exc", positions[self.elements], self.gradients)
+        return F
+
+    def objective(self, positions: FloatArray) -> float:
+        """1/2 ||x - target||_M^2, in m^2, or in kg m^2 with masses."""
+        difference = positions - self.target
+        return 0.5 * float(np.sum(self.weights[:, None] * difference**2))
+
+    def infeasible_pins(self) -> str | None:
+        """Why no positions can meet the limits, where the pins alone show it; else None.
+
+        An edge with material vector e is at most L(e) long under the limits (see
+        `longest_edges`), so two pins are at most as far apart as the shortest path of such
+        lengths along the edges. A None does not say that the problem is feasible.
+        """
+        if len(self.pinned) < 2:
+            return None
+        lengths = self._reach[:, self.pinned]
+        apart = np.linalg.norm(
+            self.target[self.pinned][:, None] - self.target[self.pinned][None], axis=2
+        )
+        excess = apart - lengths * (1 + 1e-12)
+        i, j = np.unravel_index(int(np.argmax(excess)), excess.shape)
+        if excess[i, j] <= 0:
+            return None
+        return (
+            f"infeasible: pinned vertices {self.pinned[i]} and {self.pinned[j]} are "
+            f"{apart[i, j]:.6g} m apart, and the limits allow at most {lengths[i, j]:.6g} m"
+        )
+
+    @property
+    def largest_objective(self) -> float:
+        """An upper bound on the objective of any feasible point; infinite without pins."""
+        if len(self.pinned) == 0:
+            return float("inf")
+        pin = self.target[self.pinned[0]]
+        farthest = np.linalg.norm(self.target - pin, axis=1) + self._reach[0]
+        return 0.5 * float(np.sum((self.weights * farthest**2)[self.free]))
+
+    @cached_property
+    def _reach(self) -> FloatArray:
+        """(p, n) an upper bound on the distance of each vertex from each pin [m]."""
+        edges, lengths = longest_edges(self)
+        graph = sp.csr_array((lengths, (edges[:, 0], edges[:, 1])), shape=2 * (self.vertices,))
+        reach: FloatArray = dijkstra(graph, directed=False, indices=self.pinned)
+        return reach
+
+
+def longest_edges(problem: Problem) -> tuple[IntArray, FloatArray]:
+    """How long the limits let each edge become.
+
+    With e = sum_j c_j d_j over dim of the limited directions, ||F e|| <= sum_j |c_j| b_j;
+    the smallest such bound over all choices of directions and adjacent elements is kept.
+
+    Returns
+    -------
+    edges : (k, 2)
+        Vertex pairs whose length the limits bound.
+    lengths : (k,)
+        Upper bound on the deformed length [m].
+    """
+    dim = problem.rest.shape[1]
+    directions = problem.limits.directions
+    bounds = problem.bounds.reshape(len(problem.elements), len(directions))
+    pairs = list(combinations(range(dim + 1), 2))
+    ends = problem.elements[:, pairs]
+    vectors = problem.rest[ends[..., 1]] - problem.rest[ends[..., 0]]
+    longest = np.full(ends.shape[:2], np.inf)
+    for chosen in combinations(range(len(directions)), dim):
+        basis = directions[list(chosen)].T
+        if abs(np.linalg.det(basis)) < 1e-9:
+            continue
+        coefficients = np.abs(np.linalg.solve(basis, vectors.reshape(-1, dim).T).T)
+        length = np.einsum("epd,ed->ep", coefficients.reshape(vectors.shape), bounds[:, chosen])
+        longest = np.minimum(longest, length)
+    edges = np.sort(ends.reshape(-1, 2), axis=1)
+    unique, inverse = np.unique(edges, axis=0, return_inverse=True)
+    lengths = np.full(len(unique), np.inf)
+    np.minimum.at(lengths, inverse.ravel(), longest.ravel())
+    limited = np.isfinite(lengths)
+    return unique[limited], lengths[limited]

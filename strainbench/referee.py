@@ -1,0 +1,150 @@
+"""The referee: what an answer is worth, from its positions alone.
+
+With any multipliers Y, L(x) = f(x) + sum_i <Y_i, (G x)_i> - b_i |Y_i| is strongly convex, with
+its minimum D(Y) at x_Y = target - M^-1 G^T Y on the free vertices. So, in the norm of M:
+
+1. D(Y) = <Y, G target> - 1/2 ||G^T Y||^2_{M^-1} - sum b_i |Y_i| is a lower bound on f(x*).
+2. A point with violations v_i has L(x) <= f(x) + sum |Y_i| v_i, so
+   1/2 ||x - x_Y||^2 <= f(x) + sum |Y_i| v_i - D(Y): its gap, never negative.
+3. A feasible x_ref has 1/2 ||x_ref - x*||^2 <= f(x_ref) - D(Y), and x* the same distance to x_Y
+   at most, so ||x - x*|| <= min(||x - x_ref||, ||x - x_Y||) + sqrt(2 (f(x_ref) - D(Y))).
+   A feasible x is itself such an x_ref: ||x - x*|| <= sqrt(2 (f(x) - D(Y))).
+
+Y and x_ref come from a reference solver (`strainbench.reference`); nothing that it claims is
+used: Y may be anything, and x_ref is feasible or is not used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from strainbench.limits import FloatArray
+from strainbench.problem import Problem
+from strainbench.reference import Reference, objective_floor, reference_of
+
+OUTCOMES = ("optimal", "feasible", "violated", "no answer")
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What the referee found; lengths in m, objectives in m^2 (kg m^2 with masses).
+
+    Attributes
+    ----------
+    outcome : "optimal" (violation and gap both met), "feasible" (the violation alone),
+        "violated", or "no answer" (nothing usable came back).
+    reason : in words, where the outcome is not "optimal".
+    max_violation : largest max(0, ||F d|| - b) over the limited directions.
+    max_principal_stretch : largest singular value of any F, the true stretch.
+    objective : f(x) = 1/2 ||x - target||_M^2.
+    lower_bound : D(Y) <= f(x*), or 0 where the reference failed.
+    relative_gap : (f(x) + sum |Y_i| v_i - D) / max(D, floor); for a feasible point the usual
+        (f - D) / D. The floor is half a squared correction of 1e-4 edges a vertex.
+    distance : largest distance of a vertex from the reference solution; NaN without one.
+    distance_bound : rigorous upper bound on ||x - x*||, the 2-norm over all vertices.
+    reference_error : rigorous upper bound on ||x_ref - x*|| in the same norm.
+    active_constraints : rows within 1e-6 of their bound at the reference solution.
+    """
+
+    outcome: str
+    reason: str
+    max_violation: float
+    max_principal_stretch: float
+    objective: float
+    lower_bound: float
+    relative_gap: float
+    distance: float
+    distance_bound: float
+    reference_error: float
+    active_constraints: int
+
+
+def certify(
+    problem: Problem,
+    positions: FloatArray,
+    violation: float = 1e-6,
+    gap: float = 1e-4,
+    reference: Reference | None = None,
+) -> Certificate:
+    """Judge an answer to `problem`.
+
+    Parameters
+    ----------
+    positions : (n, 3) [m]; pinned vertices count as lying at their targets, so moving a pin
+        shows as stretch of the elements around it.
+    violation, gap : thresholds of the outcome.
+    reference : of this very problem, where it is known already.
+
+    Raises
+    ------
+    ValueError
+        If a threshold is not positive.
+    """
+    if not (violation > 0 and gap > 0):
+        raise ValueError(f"violation is {violation} and gap {gap}: numbers above 0 are valid")
+    reason = _unusable(problem, positions)
+    if reason:
+        nan = float("nan")
+        return Certificate("no answer", reason, nan, nan, nan, nan, nan, nan, nan, nan, 0)
+    x = np.array(positions, dtype=np.float64)
+    x[problem.pinned] = problem.target[problem.pinned]
+    ref = reference_of(problem) if reference is None else reference
+    v: FloatArray = problem.violations(x)
+    objective = problem.objective(x)
+    true_gap = max(0.0, objective + float(ref.multiplier_norms @ v) - ref.lower_bound)
+    relative_gap = true_gap / max(ref.lower_bound, objective_floor(problem))
+    radius = float(np.sqrt(2 * true_gap / problem.least_weight))
+    apart = np.linalg.norm(x - ref.positions)
+    worst = float(v.max())
+    outcome, reason = _outcome(ref, worst, relative_gap, violation, gap)
+    bound = float(np.fmin(apart, radius)) + ref.error
+    return Certificate(
+        outcome=outcome,
+        reason=reason,
+        max_violation=worst,
+        max_principal_stretch=_largest_singular_value(problem, x),
+        objective=objective,
+        lower_bound=ref.lower_bound,
+        relative_gap=relative_gap,
+        distance=float(np.linalg.norm(x - ref.positions, axis=1).max()),
+        distance_bound=min(bound, float(radius)) if worst == 0 else bound,
+        reference_error=ref.error,
+        active_constraints=ref.active_constraints,
+    )
+
+
+def _unusable(problem: Problem, positions: FloatArray) -> str | None:
+    """Why an answer cannot be judged at all, or None."""
+    array = np.asarray(positions)
+    if array.shape != problem.target.shape:
+        return f"positions of shape {array.shape}, not {problem.target.shape}"
+    if not np.issubdtype(array.dtype, np.number) or np.iscomplexobj(array):
+        return f"positions of type {array.dtype}"
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        return f"positions of {len(bad)} vertices are not finite"
+    return None
+
+
+def _largest_singular_value(problem: Problem, x: FloatArray) -> float:
+    F = problem.deformation_gradients(x)
+    return float(np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, 1, 2) @ F)[:, -1].max()))
+
+
+def _outcome(
+    ref: Reference,
+    worst: float,
+    relative_gap: float,
+    violation: float,
+    gap: float,
+) -> tuple[str, str]:
+    """Outcome and reason from the two thresholds."""
+    if worst > violation:
+        return "violated", ref.infeasible or f"violation {worst:.2e} above {violation:.0e}"
+    if relative_gap <= gap:
+        return "optimal", ""
+    if not np.isfinite(ref.error):
+        return "feasible", "the reference solver found no feasible point to compare with"
+    return "feasible", f"relative gap {relative_gap:.2e} above {gap:.0e}"

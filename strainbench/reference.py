@@ -1,0 +1,146 @@
+"""Reference optima for the referee: solved by one solver of the suite, verified here.
+
+Each is solved with the bounds tightened by a hair, so that the positions are feasible for the
+true ones; bound and error are then computed from positions and multipliers alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strainbench.limits import FloatArray
+from strainbench.problem import Problem
+from strainbench.solver import Solver, run_solver
+
+REFERENCE_SOLVER = "clarabel"
+TOLERANCE = 1e-6  # for which this solver's own tolerances are 1e-8; below, it stalls
+MARGINS = (1e-8, 1e-7, 1e-6)  # of stretch; the first that leaves the positions feasible serves
+ACTIVE = 1e-6  # rows this close to their bound count as active
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A verified lower bound and, with it, a feasible point.
+
+    Attributes
+    ----------
+    positions : (n, 3) [m], feasible, or NaN where none was found
+    multiplier_norms : (rows,) |Y_i|
+    lower_bound : on the objective of any feasible point
+    error : rigorous bound on ||positions - x*||, and on ||x_Y - x*|| [m]; infinite without one
+    active_constraints : rows within ACTIVE of their bound
+    infeasible : why no positions can meet the limits, where that is certain
+    """
+
+    positions: FloatArray
+    multiplier_norms: FloatArray
+    lower_bound: float
+    error: float
+    active_constraints: int
+    infeasible: str | None = None
+
+
+def objective_floor(problem: Problem) -> float:
+    """Half a squared correction of 1e-4 mean edges a vertex: the least scale of a relative gap."""
+    return 0.5 * float(np.sum(problem.weights[problem.free])) * (1e-4 * problem.edge_length) ** 2
+
+
+def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> Reference:
+    """Bounds that hold whatever the positions (n, 3) and multipliers (rows, 3) are.
+
+    Y is scaled by the factor that makes D largest: D = lin^2 / 2 q with
+    lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its own rounding.
+    """
+    Y = np.where(np.isfinite(multipliers), multipliers, 0.0)
+    norms = np.linalg.norm(Y, axis=1)
+    terms = np.sum(Y * (problem.G @ problem.target), axis=1) - problem.bounds * norms
+    back = (problem.G.T @ Y)[problem.free]
+    q = float(np.sum(back**2 / problem.weights[problem.free, None]))
+    rounding = 16 * np.finfo(float).eps * 2 * float(np.sum(problem.bounds * norms))
+    linear = float(np.sum(terms)) - rounding
+    scale = linear / q if linear > 0 and q > 0 else 0.0
+    lower_bound = 0.5 * linear * scale
+    infeasible = problem.infeasible_pins()
+    if infeasible is None and lower_bound > problem.largest_objective:
+        infeasible = "infeasible: the dual bound exceeds the objective of any point within limits"
+    feasible = bool(np.all(np.isfinite(positions))) and not np.any(problem.violations(positions))
+    if not feasible:
+        nothing = np.full_like(problem.target, np.nan)
+        return Reference(nothing, scale * norms, lower_bound, np.inf, 0, infeasible)
+    gap = max(0.0, problem.objective(positions) - lower_bound)
+    error = np.sqrt(2 * gap / problem.least_weight)
+    active = int(np.sum(problem.stretches(positions) > problem.bounds - ACTIVE))
+    return Reference(positions, scale * norms, lower_bound, float(error), active, infeasible)
+
+
+class ReferenceSolver:
+    """References for the frames of one mesh.
+
+    Parameters
+    ----------
+    problem : any frame; its matrices are prepared once
+    cache : a folder in which references are kept by content, or None
+    """
+
+    def __init__(self, problem: Problem, cache: Path | None = None) -> None:
+        from strainbench.discovery import find_solver  # plug-ins import this package
+
+        self._solver: Solver = find_solver(REFERENCE_SOLVER)
+        self._state: Any = None
+        self._prepared = False
+        self._problem = problem
+        self._cache = cache
+
+    def __call__(self, problem: Problem) -> Reference:
+        """The reference of a frame of this mesh."""
+        if not np.any(problem.violations(problem.target)):
+            return verify(problem, problem.target, np.zeros((problem.rows, 3)))
+        file = self._cache and self._cache / f"{content_key(problem)}.npz"
+        if file and file.exists():
+            with np.load(file) as data:
+                return verify(problem, data["positions"], data["multipliers"])
+        positions, multipliers = self._solve(problem)
+        if file:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            part = file.with_suffix(".part.npz")
+            np.savez(part, positions=positions, multipliers=multipliers)
+            part.replace(file)
+        return verify(problem, positions, multipliers)
+
+    def _solve(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
+        if not self._prepared:
+            self._state = self._solver.prepare(self._problem)
+            self._prepared = True
+        for margin in MARGINS:
+            tight = problem.tightened(margin)
+            solution = run_solver(self._solver, tight, self._state, TOLERANCE)
+            if not np.any(problem.violations(solution.positions)):
+                break
+        multipliers = solution.multipliers
+        assert multipliers is not None, f"{REFERENCE_SOLVER} returns no multipliers"
+        return solution.positions, multipliers
+
+
+def reference_of(problem: Problem) -> Reference:
+    """The reference of a single problem, nothing kept."""
+    return ReferenceSolver(problem)(problem)
+
+
+def content_key(problem: Problem) -> str:
+    """A digest of everything that the optimum depends on."""
+    digest = hashlib.sha256()
+    for array in (
+        problem.row_vertices,
+        problem.row_coefficients,
+        problem.bounds,
+        problem.target,
+        problem.pinned,
+        problem.weights,
+    ):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:32]

@@ -1,0 +1,224 @@
+"""What a solver is, and how one is run: prepared once a mesh, timed on each projection."""
+
+from __future__ import annotations
+
+import re
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields, replace
+from time import perf_counter
+from typing import Any, ClassVar
+
+import numpy as np
+
+from strainbench.limits import FloatArray, StretchLimits
+from strainbench.mesh import square_grid
+from strainbench.problem import Problem
+
+Watch = Callable[[float, FloatArray, FloatArray | None], None]
+"""Called with the seconds spent, the positions (n, 3) and perhaps the multipliers (rows, 3)."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What a solver returns; the suite adds the seconds it measured.
+
+    Parameters
+    ----------
+    positions : (n, 3) [m]; NaN where the solver has no answer.
+    status : in the solver's own words, "solved" where it claims success; never believed.
+    iterations : of the solver's outer loop.
+    multipliers : (rows, 3), optional; Y with G^T Y = M (target - x) on the free vertices, so
+        that (G x)_i and Y_i point the same way where constraint i is active.
+    details : further numbers worth recording, e.g. seconds spent in a modelling layer.
+    seconds, setup_seconds : measured by the suite: the solve, and `prepare`.
+    """
+
+    positions: FloatArray
+    status: str
+    iterations: int
+    multipliers: FloatArray | None = None
+    details: Mapping[str, float] = field(default_factory=dict)
+    seconds: float = float("nan")
+    setup_seconds: float = float("nan")
+
+
+class Clock:
+    """Solve time, which stands still while a monitor looks at an iterate."""
+
+    def __init__(self, time_limit: float | None = None, watch: Watch | None = None) -> None:
+        self._limit = float("inf") if time_limit is None else time_limit
+        self._watch = watch
+        self._paused = 0.0
+        self._start = perf_counter()
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds on the clock."""
+        return perf_counter() - self._start - self._paused
+
+    @property
+    def remaining(self) -> float:
+        """Seconds left; infinite without a limit, negative once it has passed."""
+        return self._limit - self.elapsed
+
+    @property
+    def passed(self) -> bool:
+        """Whether the deadline has passed: a solver then returns what it has."""
+        return self.remaining <= 0
+
+    def monitor(self, positions: FloatArray, multipliers: FloatArray | None = None) -> None:
+        """Show an iterate to whoever watches, off the clock."""
+        if self._watch is None:
+            return
+        start = perf_counter()
+        self._watch(start - self._start - self._paused, positions, multipliers)
+        self._paused += perf_counter() - start
+
+
+@dataclass(frozen=True)
+class Solver(ABC):
+    """A projection method: a frozen dataclass whose fields are its parameters.
+
+    The first line of the docstring reads "method (paper)"; `strainbench list` shows both.
+    `name` is lower case with hyphens. `variants` names other settings worth showing beside the
+    defaults: {"default": {"scaling": "default"}} adds the solver `<name>-default`.
+    """
+
+    name: ClassVar[str]
+    variants: ClassVar[Mapping[str, Mapping[str, object]]] = {}
+
+    def supports(self, problem: Problem) -> str | None:  # noqa: ARG002
+        """None, or the reason why this method cannot take the problem."""
+        return None
+
+    def prepare(self, problem: Problem) -> Any:  # noqa: ARG002
+        """What is worth computing once a mesh; `solve` gets it back as `state`."""
+        return None
+
+    @abstractmethod
+    def solve(
+        self,
+        problem: Problem,
+        state: Any,
+        *,
+        tolerance: float,
+        monitor: Callable[..., None],
+        deadline: Clock,
+    ) -> Solution:
+        """Project, aiming for a max violation and a relative gap below `tolerance`.
+
+        `monitor(positions)` shows an iterate, off the clock; `deadline.passed` says when to
+        stop and `deadline.remaining` how many seconds are left. The problem is read-only.
+        """
+
+    @property
+    def parameters(self) -> dict[str, object]:
+        """The fields and their values."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    @property
+    def label(self) -> str:
+        """The name, with the variant's where one matches, else with what differs from default."""
+        default = type(self)().parameters
+        changed = {k: v for k, v in self.parameters.items() if v != default[k]}
+        if not changed:
+            return self.name
+        for variant, settings in self.variants.items():
+            if changed == {k: v for k, v in settings.items() if v != default[k]}:
+                return f"{self.name}-{variant}"
+        return self.name + "[" + ",".join(f"{k}={v}" for k, v in changed.items()) + "]"
+
+
+def run_solver(
+    solver: Solver,
+    problem: Problem,
+    state: Any,
+    tolerance: float,
+    time_limit: float | None = None,
+    watch: Watch | None = None,
+) -> Solution:
+    """One timed projection with a prepared solver.
+
+    Raises
+    ------
+    TypeError
+        If the solver returns anything but a Solution.
+    """
+    clock = Clock(time_limit, watch)
+    solution = solver.solve(
+        problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
+    )
+    seconds = clock.elapsed
+    if not isinstance(solution, Solution):
+        raise TypeError(f"{solver.name} returned {type(solution).__name__}, not a Solution")
+    return replace(solution, seconds=seconds)
+
+
+def solve(
+    problem: Problem,
+    solver: str | Solver,
+    tolerance: float = 1e-6,
+    time_limit: float | None = None,
+    watch: Watch | None = None,
+) -> Solution:
+    """Project `problem` with a solver, given by name or as an object.
+
+    Parameters
+    ----------
+    tolerance : the max violation and relative gap to aim for; what is reached, `certify` tells.
+    time_limit : [s], passed on to the solver as its deadline; None is no limit.
+    watch : called off the clock with (seconds, positions, multipliers) of each iterate shown.
+
+    Raises
+    ------
+    ValueError
+        For an unknown or unavailable solver, one that does not support the problem, a tolerance
+        that is not positive, or a negative time limit.
+    """
+    from strainbench.discovery import find_solver  # the one place that knows the plug-ins
+
+    if not tolerance > 0:
+        raise ValueError(f"tolerance is {tolerance}: a number above 0 is valid")
+    if time_limit is not None and not time_limit > 0:
+        raise ValueError(f"time_limit is {time_limit}: a number of seconds above 0 is valid")
+    chosen = find_solver(solver) if isinstance(solver, str) else solver
+    refusal = chosen.supports(problem)
+    if refusal:
+        raise ValueError(f"{chosen.label} cannot take this problem: {refusal}")
+    if reason := problem.infeasible_pins():
+        nothing = np.full_like(problem.target, np.nan)
+        return Solution(nothing, reason, 0, seconds=0.0, setup_seconds=0.0)
+    warm_up(chosen, problem, tolerance)
+    start = perf_counter()
+    state = chosen.prepare(problem)
+    setup_seconds = perf_counter() - start
+    solution = run_solver(chosen, problem, state, tolerance, time_limit, watch)
+    return replace(solution, setup_seconds=setup_seconds)
+
+
+def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
+    """Compile what is compiled on first use, on four triangles with limits like the problem's.
+
+    Volumes are left to compile on the clock's first projection.
+    """
+    if problem.rest.shape[1] != 2:
+        return
+    rest, elements = square_grid(2, 1.0, "uniform")
+    bounds = np.atleast_2d(problem.limits.bounds)[0]
+    toy = Problem(
+        rest=rest,
+        elements=elements,
+        target=np.column_stack([2 * bounds.max() * rest, 0.1 * rest[:, 0]]),
+        limits=StretchLimits(problem.limits.directions, bounds),
+        pinned=np.array([0]) if len(problem.pinned) else np.array([], dtype=np.int64),
+        mass=None if problem.mass is None else np.linspace(1.0, 2.0, len(rest)),
+    )
+    run_solver(solver, toy, solver.prepare(toy), tolerance, time_limit=60.0)
+
+
+def method_and_paper(docstring: str | None) -> tuple[str, str]:
+    """The first line of a docstring, "method (paper)", as its two parts."""
+    line = (docstring or "").strip().split("\n")[0].rstrip(".")
+    match = re.fullmatch(r"(.*?)\s*\((.*)\)", line)
+    return (match[1], match[2]) if match else (line, "")
