@@ -1,0 +1,110 @@
+"""A cell of the benchmark: one scenario, one solver, one mode; and its identity on disk."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from strainbench.discovery import find_scenario, find_solver, load_file
+from strainbench.scenario import Scenario
+from strainbench.solver import Solver
+
+
+@dataclass(frozen=True)
+class PluginRef:
+    """A solver or scenario that another process can load again.
+
+    Parameters
+    ----------
+    name : its class's name in the suite
+    label : with what sets it apart from the defaults
+    parameters : all its fields
+    path : of the file that it came from, or None for one of ours
+    unavailable : why it cannot be loaded, or None
+    """
+
+    name: str
+    label: str
+    parameters: tuple[tuple[str, object], ...] = ()
+    path: str | None = None
+    unavailable: str | None = None
+
+    @classmethod
+    def of(cls, plugin: Solver | Scenario, path: str | None = None) -> PluginRef:
+        """A reference to `plugin`, from the file at `path` unless it is ours."""
+        label = plugin.label if isinstance(plugin, Solver) else plugin.name
+        return cls(plugin.name, label, tuple(plugin.parameters.items()), path)
+
+    def solver(self) -> Solver:
+        """Load it as a solver."""
+        if self.path is None:
+            return replace(find_solver(self.name), **self._settings)
+        return next(c for c in load_file(self.path, Solver) if c.name == self.name)(
+            **self._settings
+        )
+
+    def scenario(self) -> Scenario:
+        """Load it as a scenario."""
+        classes = load_file(self.path, Scenario) if self.path else [find_scenario(self.name)]
+        return next(c for c in classes if c.name == self.name)(**self._settings)
+
+    @property
+    def _settings(self) -> dict[str, Any]:
+        return dict(self.parameters)
+
+    @property
+    def identity(self) -> list[object]:
+        """Name, parameters, and the content of a file from outside: an edited file is another."""
+        content = Path(self.path).read_bytes() if self.path else b""
+        return [self.name, dict(self.parameters), hashlib.sha256(content).hexdigest()[:16]]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What is run in one process.
+
+    Parameters
+    ----------
+    mode : "simulate" (closed loop) or "replay" (every solver is fed the same recorded frames)
+    steps : time steps
+    tolerance : aimed at by the solver
+    time_limit : [s] for physics and solver together, or None
+    """
+
+    scenario: PluginRef
+    solver: PluginRef
+    mode: str
+    steps: int
+    tolerance: float
+    time_limit: float | None = None
+
+    @property
+    def key(self) -> str:
+        """A digest of what the cell measures; the time limit is not part of it."""
+        return _digest(
+            [self.scenario.identity, self.solver.identity, self.mode, self.steps, self.tolerance]
+        )
+
+    @property
+    def recording_key(self) -> str:
+        """A digest of what the replayed frames depend on, the code that makes them included."""
+        code = Path(__file__).parent
+        sources = [*sorted((code / "physics").glob("*.py")), code / "scenario.py", code / "mesh.py"]
+        if self.scenario.path is None:
+            sources.append(code.parent / "scenarios" / f"{self.scenario.name.replace('-', '_')}.py")
+        content = hashlib.sha256(b"".join(f.read_bytes() for f in sources)).hexdigest()
+        return _digest([self.scenario.identity, self.steps, content])
+
+    @property
+    def title(self) -> str:
+        """For the progress bar."""
+        scenario: dict[str, Any] = dict(self.scenario.parameters)
+        percent = 100 * scenario["limit"]
+        return f"{self.scenario.name} {scenario['resolution']} at {percent:g}%, {self.solver.label}"
+
+
+def _digest(content: object) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]

@@ -1,0 +1,202 @@
+"""The command line: list, run, report."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import psutil
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from strainbench.cell import Cell
+from strainbench.discovery import Entry, list_scenarios, list_solvers
+from strainbench.plan import plan
+from strainbench.records import RecordsError
+from strainbench.runner import Observer, Runner, Settings, Summary
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    help="Benchmark strain-limiting solvers for cloth: same scenes, one referee.",
+)
+console = Console()
+errors = Console(stderr=True, soft_wrap=True, highlight=False)
+
+
+@app.command("list")
+def list_(
+    what: Annotated[str, typer.Argument(help="solvers, scenarios, or nothing for both")] = "",
+) -> None:
+    """List solvers and scenarios: method, paper, availability."""
+    tables = {"solvers": list_solvers, "scenarios": list_scenarios}
+    if what and what not in tables:
+        raise ValueError(f"list {what}: valid are solvers, scenarios")
+    for name, entries in tables.items():
+        if what in ("", name):
+            console.print(_entries(name, entries()))
+
+
+def _entries(title: str, entries: Sequence[Entry]) -> Table:
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for column in ("name", "method", "paper", "available"):
+        table.add_column(column, overflow="fold", no_wrap=column == "name")
+    for e in entries:
+        table.add_row(e.name, e.method, e.paper, e.unavailable or "yes")
+    return table
+
+
+@app.command()
+def run(
+    scenarios: Annotated[list[str], typer.Argument(help="scenario names, or paths of .py files")],
+    solver: Annotated[
+        list[str] | None,
+        typer.Option(help="name, comma-separated names, path of a .py file, or all (default)"),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=V1,V2 of the scenario, or SOLVER.KEY=V1,V2"),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="time steps a cell")] = 10,
+    mode: Annotated[str, typer.Option(help="simulate (closed loop) or replay (same frames)")] = (
+        "simulate"
+    ),
+    tolerance: Annotated[str, typer.Option(help="aimed at by every solver; 1e-3,1e-6 for two")] = (
+        "1e-6"
+    ),
+    time_limit: Annotated[
+        float | None, typer.Option(help="seconds a cell, physics and solver; none by default")
+    ] = None,
+    memory_limit: Annotated[
+        float | None, typer.Option(help="MB a cell; by default 3/4 of the machine's, shared")
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="cells at a time; the referee takes one more core")] = 1,
+    threads: Annotated[int, typer.Option(help="threads a solver")] = 1,
+    results: Annotated[Path, typer.Option(help="folder of the results")] = Path(
+        "results/local/run"
+    ),
+    rerun: Annotated[bool, typer.Option("--rerun", help="run finished cells again")] = False,
+) -> None:
+    """Run every combination of scenarios, settings and solvers; resumes by itself."""
+    for name, value in (("--jobs", jobs), ("--threads", threads)):
+        if value < 1:
+            raise ValueError(f"{name} {value}: a whole number above 0 is valid")
+    cells = plan(
+        scenarios, solver or ["all"], set_ or [], mode, steps, _numbers(tolerance), time_limit
+    )
+    memory = memory_limit or 0.75 * psutil.virtual_memory().total / 1024**2 / jobs
+    settings = Settings(results, jobs, threads, memory, rerun)
+    with Display() as display:
+        summary = Runner(settings, display).run(cells)
+    _print_summary(summary, len(cells), results)
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(word) for word in text.split(",")]
+    except ValueError:
+        raise ValueError(
+            f"--tolerance {text}: a number, or several with commas, is valid"
+        ) from None
+
+
+class Display(Observer):
+    """A progress bar over all steps, with what is running, and a line for each ended cell."""
+
+    def __init__(self) -> None:
+        self.progress = Progress(
+            SpinnerColumn(),
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TextColumn("steps,"),
+            TimeElapsedColumn(),
+            TextColumn("gone,"),
+            TimeRemainingColumn(),
+            TextColumn("left"),
+            console=console,
+        )
+        self.running: dict[str, int] = {}
+        self.done = 0
+
+    def __enter__(self) -> Display:
+        self.progress.start()
+        self.task = self.progress.add_task("starting", total=None)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.progress.stop()
+
+    def planned(self, cells: Sequence[Cell], skipped: int) -> None:
+        """See the base class."""
+        if skipped:
+            console.print(f"{skipped} cells finished before; --rerun runs them again")
+        self.progress.update(self.task, total=sum(c.steps for c in cells))
+
+    def started(self, cell: Cell) -> None:
+        """See the base class."""
+        self.running[cell.title] = 0
+        self._show()
+
+    def stepped(self, cell: Cell, steps: int) -> None:
+        """See the base class."""
+        self.running[cell.title] = steps
+        self._show()
+
+    def ended(self, cell: Cell, row: dict[str, object]) -> None:
+        """See the base class."""
+        self.running.pop(cell.title, None)
+        self.done += cell.steps
+        seconds = row.get("solve_seconds_mean", "")
+        time = f"{float(str(seconds)):.4f} s a solve" if seconds != "" else "no solve"
+        reason = f": {row['reason']}" if row["reason"] else ""
+        console.print(f"{cell.title}: {time}, {row['outcome']}{reason}", highlight=False)
+        self._show()
+
+    def _show(self) -> None:
+        completed = self.done + sum(self.running.values())
+        what = " | ".join(self.running) or "the referee"
+        self.progress.update(self.task, completed=completed, description=what)
+
+
+def _print_summary(summary: Summary, planned: int, results: Path) -> None:
+    if not summary.cells:
+        console.print(f"nothing to run: all {planned} cells have finished; results in {results}")
+        return
+    console.print(
+        f"{summary.cells} cells in {summary.wall:.1f} s: solvers and physics {summary.play:.1f} s, "
+        f"processes' start {summary.start:.1f} s, suite overhead {100 * summary.overhead:.1f}% "
+        f"of the wall time; the referee worked {summary.judging:.1f} s beside them",
+        highlight=False,
+    )
+    console.print(f"results in {results}", highlight=False)
+
+
+def main() -> None:
+    """Run the command line; exit 2 with one line for a wrong word, 130 when interrupted."""
+    try:
+        app(standalone_mode=False)
+    except typer.TyperException as error:
+        context = getattr(error, "ctx", None)
+        usage = f" ({context.command_path} --help lists what is valid)" if context else ""
+        errors.print(f"strainbench: {error.format_message()}{usage}")
+        sys.exit(2)
+    except (ValueError, RecordsError) as error:
+        errors.print(f"strainbench: {error}", markup=False)
+        sys.exit(2)
+    except (KeyboardInterrupt, typer.Abort):
+        errors.print("strainbench: interrupted; every finished cell is kept, run again to resume")
+        sys.exit(130)

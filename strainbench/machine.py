@@ -1,0 +1,63 @@
+"""The facts of a machine that a time depends on."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import PackageNotFoundError, version
+
+import psutil
+from cpuinfo import get_cpu_info
+
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+    "RAYON_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+PACKAGES = ("clarabel", "cvxpy", "cyipopt", "numba", "numpy", "osqp", "scipy", "strainbench")
+
+
+def describe_machine(threads: int) -> tuple[str, dict[str, object]]:
+    """A short name and the facts: processor, memory, system, versions, threads a solver."""
+    cpu = get_cpu_info()
+    model = str(cpu.get("brand_raw", platform.processor() or "unknown processor"))
+    facts: dict[str, object] = {
+        "processor": model,
+        "cores": psutil.cpu_count(logical=False) or os.cpu_count(),
+        "memory_gb": round(psutil.virtual_memory().total / 1024**3, 1),
+        "system": f"{platform.system()} {platform.machine()}",
+        "python": platform.python_version(),
+        "threads_per_solver": threads,
+        "packages": {name: _version(name) for name in PACKAGES},
+    }
+    digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:6]
+    return f"{model}, {facts['cores']} cores ({digest})", facts
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+@contextmanager
+def fixed_threads(threads: int) -> Iterator[None]:
+    """Let processes started inside use this many threads in BLAS, OpenMP, numba and rayon."""
+    before = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update({name: str(threads) for name in THREAD_VARIABLES})
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value

@@ -1,0 +1,147 @@
+"""From the words of a command line to cells: the cross product of all that is given."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+from itertools import product
+from pathlib import Path
+from types import UnionType
+from typing import Any, get_args, get_type_hints
+
+from strainbench.cell import Cell, PluginRef
+from strainbench.discovery import (
+    UnavailableError,
+    find_scenario,
+    find_solver,
+    list_solvers,
+    load_file,
+)
+from strainbench.scenario import Scenario
+from strainbench.solver import Solver
+
+MODES = ("simulate", "replay")
+Choices = dict[str, dict[str, list[str]]]
+"""Values by owner ("" where none was named) and key."""
+
+
+def is_file(word: str) -> bool:
+    """Whether a word means a file rather than a name."""
+    return word.endswith(".py") or "/" in word
+
+
+def parse_settings(words: Iterable[str]) -> Choices:
+    """`key=v1,v2` and `owner.key=v1,v2`, where the owner is a scenario or a solver."""
+    choices: Choices = {}
+    for word in words:
+        key, equals, values = word.partition("=")
+        owner, _, name = key.rpartition(".")
+        if not equals or not name or not values:
+            raise ValueError(f"--set {word}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
+        choices.setdefault(owner, {}).setdefault(name, []).extend(values.split(","))
+    return choices
+
+
+def parse_value(owner: str, key: str, hint: Any, text: str) -> object:
+    """A value of a field's type; percentages are numbers too: 1% is 0.01."""
+    kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+    try:
+        if type(None) in kinds and text.lower() == "none":
+            return None
+        if bool in kinds:
+            return {"true": True, "false": False}[text.lower()]
+        if int in kinds:
+            return int(text)
+        if float in kinds:
+            return float(text[:-1]) / 100 if text.endswith("%") else float(text)
+    except (KeyError, ValueError):
+        names = " or ".join("none" if k is type(None) else k.__name__ for k in kinds)
+        raise ValueError(f"--set {owner}.{key}={text}: the value must be {names}") from None
+    return text
+
+
+def variations(plugin: type[Scenario] | Solver, choices: Choices, shared: bool) -> list[Any]:
+    """A plug-in with every combination of the values chosen for its fields."""
+    kind = plugin if isinstance(plugin, type) else type(plugin)
+    base: dict[str, Any] = {} if isinstance(plugin, type) else plugin.parameters
+    chosen = dict(choices.get("", {})) if shared else {}
+    chosen |= choices.get(kind.name, {})
+    hints = get_type_hints(kind)
+    names = [f.name for f in fields(kind)]
+    for key in chosen:
+        if key not in names:
+            raise ValueError(f"{kind.name} has no setting {key!r}; valid are {', '.join(names)}")
+    values = [[parse_value(kind.name, k, hints[k], v) for v in vs] for k, vs in chosen.items()]
+    combinations: list[dict[str, Any]] = [
+        dict(zip(chosen, combination, strict=True)) for combination in product(*values)
+    ]
+    try:
+        return [kind(**{**base, **settings}) for settings in combinations]
+    except ValueError as error:
+        raise ValueError(f"{kind.name}: {error}") from None
+
+
+def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
+    """The scenarios named, or given as files, with every combination of settings."""
+    refs = []
+    for word in words:
+        classes = load_file(word, Scenario) if is_file(word) else [find_scenario(word)]
+        path = str(Path(word).resolve()) if is_file(word) else None
+        refs += [PluginRef.of(s, path) for c in classes for s in variations(c, choices, True)]
+    return refs
+
+
+def plan_solvers(words: Sequence[str], choices: Choices) -> list[PluginRef]:
+    """The solvers named, or given as files; "all" is every one of ours, unavailable ones too."""
+    names = [n for w in words for n in ([w] if is_file(w) else w.split(","))]
+    if "all" in names:
+        ours = [e.name for e in list_solvers()]
+        names = [n for name in names for n in (ours if name == "all" else [name])]
+    refs: list[PluginRef] = []
+    for name in dict.fromkeys(names):
+        path = str(Path(name).resolve()) if is_file(name) else None
+        try:
+            found = [c() for c in load_file(name, Solver)] if path else [find_solver(name)]
+        except UnavailableError as error:
+            refs.append(PluginRef(name, name, unavailable=str(error)))
+            continue
+        refs += [PluginRef.of(v, path) for s in found for v in variations(s, choices, False)]
+    return list(dict.fromkeys(refs))
+
+
+def plan(
+    scenarios: Sequence[str],
+    solvers: Sequence[str],
+    settings: Sequence[str],
+    mode: str,
+    steps: int,
+    tolerances: Sequence[float],
+    time_limit: float | None,
+) -> list[Cell]:
+    """All cells of a run.
+
+    Raises
+    ------
+    ValueError
+        One line that names the wrong word and what is valid.
+    """
+    if mode not in MODES:
+        raise ValueError(f"--mode {mode}: valid are {', '.join(MODES)}")
+    if steps < 1:
+        raise ValueError(f"--steps {steps}: a whole number above 0 is valid")
+    for name, values in (("--tolerance", tolerances), ("--time-limit", [time_limit or 1.0])):
+        for value in values:
+            if not 0 < value < float("inf"):
+                raise ValueError(f"{name} {value}: a number above 0 is valid")
+    choices = parse_settings(settings)
+    scenes = plan_scenarios(scenarios, choices)
+    methods = plan_solvers(solvers, choices)
+    owners = {ref.name for ref in [*scenes, *methods]}
+    for owner in choices:
+        if owner and owner not in owners:
+            valid = ", ".join(sorted(owners))
+            raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
+    return [
+        Cell(scene, method, mode, steps, tolerance, time_limit)
+        for scene, method, tolerance in product(scenes, methods, tolerances)
+    ]
