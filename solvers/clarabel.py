@@ -71,11 +71,17 @@ class Clarabel(Solver):
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """One interior-point run; Clarabel's tolerances are a hundredth of `tolerance`."""
+        """One interior-point run.
+
+        Clarabel's gaps are relative only where the objective exceeds 1, so small corrections
+        need small tolerances: 1e-4 of `tolerance` for the gaps, 1e-2 for feasibility. The
+        unscaled variants have 1e-2 for all, Clarabel's defaults at the usual `tolerance` of 1e-6.
+        """
         settings = self._settings()
         settings.time_limit = max(deadline.remaining, 1e-3)
-        for name in ("tol_gap_abs", "tol_gap_rel", "tol_feas"):
-            setattr(settings, name, 0.01 * tolerance)
+        settings.tol_feas = 1e-2 * tolerance
+        settings.tol_gap_abs = (1e-2 if self.scaling is None else 1e-4) * tolerance
+        settings.tol_gap_rel = settings.tol_gap_abs
         q, rhs = state.vectors(problem)
         state.solver.update(q=q, b=rhs, settings=settings)
         result = state.solver.solve()

@@ -34,6 +34,7 @@ app = typer.Typer(
     help="Benchmark strain-limiting solvers for cloth: same scenes, one referee.",
 )
 console = Console()
+DEFAULT_RESULTS = Path("results/local/run")
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
@@ -111,6 +112,17 @@ def _numbers(text: str) -> list[float]:
         raise ValueError(
             f"--tolerance {text}: a number, or several with commas, is valid"
         ) from None
+
+
+@app.command()
+def report(
+    results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_RESULTS,
+) -> None:
+    """Write tables (CSV, Markdown, LaTeX), charts and an HTML page from results."""
+    from strainbench.report import write_report  # pandas and matplotlib only where needed
+
+    for path in write_report(results):
+        console.print(f"wrote {path}", highlight=False)
 
 
 class Display(Observer):

@@ -176,7 +176,8 @@ def _outcome(
         outcome = max((c.outcome for c in certificates), key=OUTCOMES.index)
         worst = [c for c in certificates if c.outcome == outcome]
         if outcome != "optimal":
-            reasons.append(f"{len(worst)} of {len(certificates)} projections: {worst[-1].reason}")
+            found = max(worst, key=lambda c: (c.max_violation, c.relative_gap)).reason
+            reasons.append(f"{len(worst)} of {len(certificates)} projections: {found} at worst")
     unconverged = sum(e["event"] == "step" and not e["newton_converged"] for e in events)
     if unconverged:
         reasons.append(f"Newton did not converge on {unconverged} steps")

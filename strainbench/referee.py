@@ -41,7 +41,7 @@ class Certificate:
     objective : f(x) = 1/2 ||x - target||_M^2.
     lower_bound : D(Y) <= f(x*), or 0 where the reference failed.
     relative_gap : (f(x) + sum |Y_i| v_i - D) / max(D, floor); for a feasible point the usual
-        (f - D) / D. The floor is half a squared correction of 1e-4 edges a vertex.
+        (f - D) / D. The floor is half a squared correction of 1e-3 edges a vertex.
     distance : largest distance of a vertex from the reference solution; NaN without one.
     distance_bound : rigorous upper bound on ||x - x*||, the 2-norm over all vertices.
     reference_error : rigorous upper bound on ||x_ref - x*|| in the same norm.

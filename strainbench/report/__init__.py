@@ -1,0 +1,65 @@
+"""Tables and charts from a results folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from strainbench.records import RecordsError, latest_runs, read_machines
+from strainbench.report.chart import speed_accuracy
+from strainbench.report.page import write_page
+from strainbench.report.table import as_latex, as_markdown, tidy
+
+NUMBERS = [
+    "resolution",
+    "limit",
+    "tolerance",
+    "steps_asked",
+    "steps_done",
+    "solve_seconds_mean",
+    "solve_seconds_median",
+    "setup_seconds",
+    "ie_seconds_mean",
+    "iterations_mean",
+    "max_violation",
+    "max_principal_stretch",
+    "relative_gap_max",
+    "distance_max",
+    "distance_bound_max",
+    "projections",
+    "projections_violated",
+    "projections_optimal",
+    "newton_failures",
+]
+
+
+def load_runs(folder: Path) -> pd.DataFrame:
+    """The newest row of each cell, numbers as numbers.
+
+    Raises
+    ------
+    RecordsError
+        If there is nothing to report, or the records are damaged.
+    """
+    rows = list(latest_runs(folder).values())
+    if not rows:
+        raise RecordsError(f"{folder} holds no results: `strainbench run ... --results {folder}`")
+    runs = pd.DataFrame(rows)
+    for column in NUMBERS:
+        runs[column] = pd.to_numeric(runs[column])
+    return runs
+
+
+def write_report(folder: Path) -> list[Path]:
+    """Write table1.csv, .md, .tex, speed-accuracy.svg, .png and index.html; return their paths."""
+    runs = load_runs(folder)
+    machines = read_machines(folder)
+    paths = {n: folder / n for n in ("table1.csv", "table1.md", "table1.tex", "index.html")}
+    tidy(runs).to_csv(paths["table1.csv"], index=False)
+    markdown = as_markdown(runs, machines)
+    paths["table1.md"].write_text(markdown)
+    paths["table1.tex"].write_text(as_latex(runs))
+    charts = speed_accuracy(runs, folder / "speed-accuracy")
+    write_page(paths["index.html"], runs, machines, charts)
+    return [*paths.values(), *charts]

@@ -1,0 +1,38 @@
+"""One self-contained HTML page: the chart, the tables, the reasons, the machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader
+from markupsafe import Markup
+
+from strainbench.report.table import accuracy_text, explanation, groups, reasons, time_text
+
+
+def write_page(
+    path: Path,
+    runs: pd.DataFrame,
+    machines: Mapping[str, Mapping[str, object]],
+    charts: Sequence[Path],
+) -> None:
+    """Write the page; the chart is inlined, nothing is fetched."""
+    environment = Environment(
+        loader=PackageLoader("strainbench.report", "."),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    svg = next(c for c in charts if c.suffix == ".svg").read_text()
+    page = environment.get_template("page.html").render(
+        chart=Markup(svg[svg.index("<svg") :]),
+        explanation=explanation(runs).replace("`", "").replace("**", ""),
+        groups=list(groups(runs)),
+        time_text=time_text,
+        accuracy_text=accuracy_text,
+        reasons=reasons(runs),
+        machines=machines,
+    )
+    path.write_text(page)

@@ -1,0 +1,187 @@
+"""Table 1 in the shape of Tang et al. 2022, with the accuracy reached beside each time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import pandas as pd
+
+GROUP = ["scenario", "mode", "integrator", "directions", "tolerance", "steps_asked"]
+UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
+EXPLANATION = """\
+Seconds are means over projections of the time inside the solver, set-up apart, measured by the
+suite. `*`: some steps did not converge (the referee finds a violation above {violation}) or the
+cell's time ran out, the steps done in brackets; `-`: no usable answer. Beside each time stands
+what the referee found, at its worst over all steps: largest violation, relative gap to the
+certified lower bound, largest distance of a vertex from the certified optimum in mm. **Bold**:
+optimal on every step (violation at most {violation}, relative gap at most {gap})."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """The rows of one table: all alike but for resolution, limit and solver."""
+
+    title: str
+    runs: pd.DataFrame
+
+    @property
+    def resolutions(self) -> list[int]:
+        """In rising order."""
+        return sorted(int(r) for r in self.runs["resolution"].unique())
+
+    def blocks(self) -> Iterator[tuple[str, str, list[pd.Series | None]]]:
+        """(limit, solver, row or None for each resolution), implicit Euler left out."""
+        constrained = self.runs[self.runs["solver"] != UNCONSTRAINED]
+        for limit, block in constrained.groupby("limit"):
+            for solver, rows in block.groupby("solver", sort=False):
+                by_resolution = {int(r["resolution"]): r for _, r in rows.iterrows()}
+                yield (
+                    f"{100 * limit:g}%",
+                    str(solver),
+                    [by_resolution.get(n) for n in self.resolutions],
+                )
+
+    def implicit_euler(self) -> list[float]:
+        """Mean seconds a step of unconstrained implicit Euler; NaN where it did not run."""
+        alone = self.runs[self.runs["solver"] == UNCONSTRAINED]
+        means = alone.groupby("resolution")["ie_seconds_mean"].mean()
+        return [float(means.get(n, float("nan"))) for n in self.resolutions]
+
+
+def groups(runs: pd.DataFrame) -> Iterator[Group]:
+    """The tables of a results folder."""
+    for key, rows in runs.groupby(GROUP, sort=False, dropna=False):
+        scenario, mode, integrator, directions, tolerance, steps = key
+        title = (
+            f"{scenario}, {mode}, {integrator}, {directions} directions, "
+            f"tolerance {tolerance:g}, {steps} steps"
+        )
+        yield Group(title, rows)
+
+
+def mark(row: pd.Series) -> str:
+    """ "-" for no usable answer, "*" for some steps not converged, else nothing."""
+    cut_off = row["steps_done"] < row["steps_asked"]
+    if cut_off and (row["steps_done"] == 0 or not row["reason"].startswith("time limit")):
+        return "-"
+    return "*" if cut_off or row["projections_violated"] > 0 else ""
+
+
+def time_text(row: pd.Series | None) -> str:
+    """Seconds a projection with its mark."""
+    if row is None:
+        return ""
+    if mark(row) == "-":
+        return "-"
+    steps = row["steps_asked"] - row["steps_done"]
+    done = f" ({row['steps_done']:.0f}/{row['steps_asked']:.0f})" if steps else ""
+    return f"{mark(row)}{row['solve_seconds_mean']:.4f}{done}"
+
+
+def accuracy_text(row: pd.Series | None) -> str:
+    """Violation, relative gap, distance in mm."""
+    if row is None or pd.isna(row["max_violation"]):
+        return ""
+    return " · ".join(
+        (
+            _power(row["max_violation"]),
+            _power(row["relative_gap_max"]),
+            f"{1000 * row['distance_max']:.2g}",
+        )
+    )
+
+
+def _power(value: float) -> str:
+    return f"{value:.0e}".replace("e-0", "e-").replace("0e+00", "0").replace("e+00", "")
+
+
+def tidy(runs: pd.DataFrame) -> pd.DataFrame:
+    """One line a cell, for further processing."""
+    table = runs[[*GROUP, "resolution", "limit", "solver"]].copy()
+    table["seconds"] = runs["solve_seconds_mean"]
+    table["mark"] = [mark(row) for _, row in runs.iterrows()]
+    for column in ("ie_seconds_mean", "outcome", "max_violation", "relative_gap_max"):
+        table[column] = runs[column]
+    table["distance_mm"] = 1000 * runs["distance_max"]
+    for column in ("max_principal_stretch", "iterations_mean", "steps_done", "reason", "machine"):
+        table[column] = runs[column]
+    return table
+
+
+def explanation(runs: pd.DataFrame) -> str:
+    """What the signs of a table mean."""
+    thresholds = runs.iloc[0]
+    return EXPLANATION.format(
+        violation=thresholds["violation_threshold"], gap=thresholds["gap_threshold"]
+    )
+
+
+def reasons(runs: pd.DataFrame) -> list[str]:
+    """A line for each cell that is not optimal on every step."""
+    return [
+        f"{r['scenario']} {r['resolution']:.0f} at {100 * r['limit']:g}%, {r['mode']}, "
+        f"{r['solver']}: {r['outcome']}; {r['reason']}"
+        for _, r in runs.iterrows()
+        if r["reason"] and r["solver"] != UNCONSTRAINED
+    ]
+
+
+def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
+    """All tables, what their signs mean, the reasons of every failure, the machine."""
+    parts = ["# Table 1: seconds a projection, and the accuracy reached", explanation(runs)]
+    parts += [_markdown_group(group) for group in groups(runs)]
+    if lines := [f"- {reason}" for reason in reasons(runs)]:
+        parts.append("## What kept a cell from optimal\n\n" + "\n".join(lines))
+    parts.append("## Machine\n\n" + "\n".join(_machine_line(n, f) for n, f in machines.items()))
+    return "\n\n".join(parts) + "\n"
+
+
+def _markdown_group(group: Group) -> str:
+    header = ["limit", "method"]
+    for n in group.resolutions:
+        header += [f"{n}×{n} [s]", "violation · gap · mm"]
+    lines = [f"## {group.title}", "", _line(header), _line(["---"] * len(header))]
+    euler = group.implicit_euler()
+    cells = [f"{s:.4f}" if s == s else "" for s in euler]  # not NaN
+    lines.append(_line(["", "implicit Euler", *(t for c in cells for t in (c, ""))]))
+    for limit, solver, rows in group.blocks():
+        texts = []
+        for row in rows:
+            bold = "**" if row is not None and row["outcome"] == "optimal" else ""
+            texts += [f"{bold}{time_text(row)}{bold}", accuracy_text(row)]
+        lines.append(_line([limit, solver, *texts]))
+    return "\n".join(lines)
+
+
+def _line(cells: list[str]) -> str:
+    return "| " + " | ".join(cells) + " |"
+
+
+def _machine_line(name: str, facts: Mapping[str, object]) -> str:
+    packages = facts.get("packages")
+    versions = packages.items() if isinstance(packages, Mapping) else ()
+    return (
+        f"{name}: {facts['memory_gb']} GB, {facts['system']}, Python {facts['python']}, "
+        f"{facts['threads_per_solver']} thread a solver; "
+        + ", ".join(f"{package} {version}" for package, version in versions)
+    )
+
+
+def as_latex(runs: pd.DataFrame) -> str:
+    """The times alone, as tabulars in the paper's shape."""
+    parts = []
+    for group in groups(runs):
+        columns = " & ".join(rf"${n}\times{n}$" for n in group.resolutions)
+        lines = [
+            f"% {group.title}",
+            rf"\begin{{tabular}}{{ll{'r' * len(group.resolutions)}}}",
+            rf"limit & method & {columns} \\ \hline",
+        ]
+        euler = [f"{s:.3f}\\,s" if s == s else "" for s in group.implicit_euler()]
+        lines.append(" & ".join(["", "implicit Euler", *euler]) + r" \\")
+        for limit, solver, rows in group.blocks():
+            texts = [time_text(r) for r in rows]
+            lines.append(" & ".join([limit.replace("%", r"\%"), solver, *texts]) + r" \\")
+        parts.append("\n".join([*lines, r"\end{tabular}"]))
+    return "\n\n".join(parts) + "\n"
