@@ -23,7 +23,7 @@ class Material:
     density: float = 200.0  # [kg/m^3]
     young: float = 1800.0  # [Pa]
     poisson: float = 0.41
-    bending: float = 1e-6  # hinge stiffness [J]; not in the paper, see METHODS in the README
+    bending: float = 1e-6  # hinge stiffness [J]; the paper gives none
 
     @property
     def lame(self) -> tuple[float, float]:

@@ -11,27 +11,11 @@ from strainbench.report.chart import speed_accuracy
 from strainbench.report.page import write_page
 from strainbench.report.table import as_latex, as_markdown, tidy
 
-NUMBERS = [
-    "resolution",
-    "limit",
-    "tolerance",
-    "steps_asked",
-    "steps_done",
-    "solve_seconds_mean",
-    "solve_seconds_median",
-    "setup_seconds",
-    "ie_seconds_mean",
-    "iterations_mean",
-    "max_violation",
-    "max_principal_stretch",
-    "relative_gap_max",
-    "distance_max",
-    "distance_bound_max",
-    "projections",
-    "projections_violated",
-    "projections_optimal",
-    "newton_failures",
-]
+WORDS = {
+    *("cell", "finished_at", "scenario", "integrator", "solver", "mode", "outcome", "reason"),
+    *("scenario_parameters", "solver_parameters", "machine"),
+}
+"""Columns of runs.csv that are not numbers."""
 
 
 def load_runs(folder: Path) -> pd.DataFrame:
@@ -46,7 +30,7 @@ def load_runs(folder: Path) -> pd.DataFrame:
     if not rows:
         raise RecordsError(f"{folder} holds no results: `strainbench run ... --results {folder}`")
     runs = pd.DataFrame(rows)
-    for column in NUMBERS:
+    for column in runs.columns.difference(list(WORDS)):
         runs[column] = pd.to_numeric(runs[column])
     return runs
 

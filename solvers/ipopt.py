@@ -1,0 +1,247 @@
+"""Nonlinear programming with Ipopt (Tang et al. 2022, Table 1; Wachter and Biegler 2006).
+
+    minimise s/2 ||x - target||_M^2  such that  ||y_i||^2 <= b_i^2,  y = G x,
+
+over the free vertices alone, with exact sparse derivatives: row i of the Jacobian is
+2 y_i^T (x) g_i, and the Hessian of the Lagrangian, s M + 2 sum_i l_i g_i g_i^T, is the same for
+the three coordinates and linear in the multipliers l.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import cyipopt
+import numpy as np
+import scipy.sparse as sp
+
+from strainbench import Clock, Problem, Solution, Solver
+from strainbench.limits import FloatArray
+from strainbench.problem import IntArray
+
+STATUS = {
+    0: "solved",
+    1: "acceptable level",
+    2: "infeasible",
+    3: "search direction too small",
+    4: "diverging",
+    5: "time limit",
+    -1: "iteration limit",
+    -2: "restoration failed",
+    -3: "error in step computation",
+    -4: "time limit",
+    -5: "time limit",
+    -13: "invalid number",
+    -102: "out of memory",
+}
+"""Ipopt's return codes in short words (IpReturnCodes_inc.h)."""
+ANSWERS = (0, 1, 3, 4, 5, -1, -2, -3, -4, -5)
+"""The codes that come with an iterate worth judging."""
+
+
+@dataclass(frozen=True)
+class Ipopt(Solver):
+    """Nonlinear programming with Ipopt (Tang et al. 2022, Table 1; Wachter and Biegler 2006).
+
+    An interior-point line-search method with MUMPS as linear solver, started at the target. It
+    looks at its time limit between iterations alone.
+
+    Parameters
+    ----------
+    scaling : "default" is the problem in metres with Ipopt's own options: a tolerance of 1e-8
+        (`tolerance` is not used), 3000 iterations. The initial barrier parameter of 0.1 then
+        dwarfs an objective of 1e-3 m^2 and throws the cloth far from the target; where it does
+        come back, 1e-8 is too loose for multipliers of 1e-6.
+        "scaled" takes lengths in edge lengths h and s = 10 / h^2 (over the mean mass), an
+        adaptive barrier parameter, constraints not relaxed, and a hundredth of `tolerance`.
+        Tuned on frames 1 to 11 of the swing at 10, 20 and 40 cells, limits 1% and 10%: at
+        20 cells and 1%, s h^2 = 1, 10, 100 take 18, 20, 20 iterations, and at a tolerance of
+        1e-5 s h^2 = 1 leaves gaps of 1e-4; the monotone barrier strategy takes 24. Other starts
+        (last frame, rest), oracles and options of MUMPS do not help, Mehrotra's algorithm harms.
+    hessian : "exact", or "limited-memory" for Ipopt's L-BFGS.
+    """
+
+    name = "ipopt"
+    variants = {"default": {"scaling": "default"}}
+
+    scaling: str = "scaled"
+    hessian: str = "exact"
+
+    def __post_init__(self) -> None:
+        if self.scaling not in ("scaled", "default"):
+            raise ValueError(f"scaling is {self.scaling!r}: valid are scaled, default")
+        if self.hessian not in ("exact", "limited-memory"):
+            raise ValueError(f"hessian is {self.hessian!r}: valid are exact, limited-memory")
+
+    def prepare(self, problem: Problem) -> Structure:
+        """The sparsity of the derivatives."""
+        return Structure(problem)
+
+    def solve(
+        self,
+        problem: Problem,
+        state: Structure,
+        *,
+        tolerance: float,
+        monitor: Callable[..., None],
+        deadline: Clock,
+    ) -> Solution:
+        """One run of Ipopt."""
+        unit, scale = self._units(problem)
+        nlp = Callbacks(problem, state, unit, scale, monitor, deadline)
+        start = problem.target[problem.free].ravel() / unit
+        if start.size == 0:
+            return Solution(problem.target.copy(), "solved", 0)
+        ipopt = cyipopt.Problem(
+            n=start.size,
+            m=problem.rows,
+            problem_obj=nlp,
+            cl=np.full(problem.rows, -np.inf),
+            cu=problem.bounds**2,
+        )
+        for option, value in self._options(tolerance, deadline).items():
+            ipopt.add_option(option, value)
+        x, info = ipopt.solve(start)
+        code = info["status"]
+        if code not in ANSWERS:
+            x = np.full_like(start, np.nan)
+        return Solution(
+            nlp.positions(x),
+            STATUS.get(code, f"Ipopt status {code}"),
+            nlp.iterations,
+            2 / scale * info["mult_g"][:, None] * nlp.stretched(x),
+        )
+
+    def _units(self, problem: Problem) -> tuple[float, float]:
+        """The unit of length [m], and the factor s of the objective."""
+        if self.scaling == "default" or len(problem.free) == 0:
+            return 1.0, 1.0
+        edge = problem.edge_length
+        return edge, 10 / (edge**2 * float(problem.weights[problem.free].mean()))
+
+    def _options(self, tolerance: float, deadline: Clock) -> dict[str, Any]:
+        options: dict[str, Any] = {"print_level": 0, "sb": "yes"}
+        if np.isfinite(deadline.remaining):
+            options["max_wall_time"] = max(deadline.remaining, 1e-3)
+        if self.hessian == "limited-memory":
+            options["hessian_approximation"] = "limited-memory"
+        if self.scaling == "scaled":
+            options["tol"] = 0.01 * tolerance
+            options["nlp_scaling_method"] = "none"
+            options["mu_strategy"] = "adaptive"
+            options["bound_relax_factor"] = 0.0
+        return options
+
+
+class Structure:
+    """The sparsity of the derivatives, unknowns being (free vertices, 3) in C order.
+
+    Attributes
+    ----------
+    G : (rows, free vertices) sparse [1/m]
+    row, value : (non-zeros of G,) row index and entry [1/m] of each non-zero
+    jacobian, hessian : (row indices, column indices), the Hessian's of the lower triangle
+    products : (pairs, rows) sparse: 2 g_iv g_iw [1/m^2] for each pair of neighbours v >= w
+    diagonal : (free vertices,) index of the pair (v, v)
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        n = len(problem.free)
+        self.G = sp.csr_array(problem.G[:, problem.free])
+        entries = self.G.tocoo()
+        self.row, self.value = entries.row, entries.data
+        self.jacobian = np.repeat(self.row, 3), _coordinates(entries.col)
+
+        unknown = np.full(problem.vertices, -1)
+        unknown[problem.free] = np.arange(n)
+        column, g = unknown[problem.row_vertices], problem.row_coefficients
+        a, b = np.tril_indices(column.shape[1])
+        v, w = np.maximum(column[:, a], column[:, b]), np.minimum(column[:, a], column[:, b])
+        i, pair = np.nonzero(w >= 0)
+        keys = np.concatenate([(v * n + w)[i, pair], np.arange(n) * (n + 1)])
+        found, index = np.unique(keys, return_inverse=True)
+        self.products = sp.csr_array(
+            (2 * (g[:, a] * g[:, b])[i, pair], (index[: len(i)], i)),
+            shape=(len(found), problem.rows),
+        )
+        self.diagonal = index[len(i) :]
+        self.hessian = _coordinates(found // max(n, 1)), _coordinates(found % max(n, 1))
+
+
+def _coordinates(vertices: IntArray) -> IntArray:
+    """Indices of the three coordinates of each vertex."""
+    return (3 * vertices[:, None] + np.arange(3)).ravel()
+
+
+class Callbacks:
+    """Values and derivatives as cyipopt calls them, at x (3 free vertices,) in `unit` metres."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        structure: Structure,
+        unit: float,
+        scale: float,
+        monitor: Callable[..., None],
+        deadline: Clock,
+    ) -> None:
+        self.problem, self.structure, self.unit = problem, structure, unit
+        self.monitor, self.deadline = monitor, deadline
+        self.weights = scale * unit**2 * problem.weights[problem.free, None]
+        self.target = problem.target[problem.free] / unit
+        self.fixed = problem.G[:, problem.pinned] @ problem.target[problem.pinned]
+        self.iterations = 0
+        self.iterate = self.target.ravel()
+
+    def positions(self, x: FloatArray) -> FloatArray:
+        """(n, 3) [m] of all vertices."""
+        positions = self.problem.target.copy()
+        positions[self.problem.free] = self.unit * x.reshape(-1, 3)
+        return positions
+
+    def stretched(self, x: FloatArray) -> FloatArray:
+        """(rows, 3) deformed directions y = G x."""
+        y: FloatArray = self.structure.G @ (self.unit * x.reshape(-1, 3)) + self.fixed
+        return y
+
+    def objective(self, x: FloatArray) -> float:
+        """s/2 ||x - target||_M^2."""
+        return 0.5 * float(np.sum(self.weights * (x.reshape(-1, 3) - self.target) ** 2))
+
+    def gradient(self, x: FloatArray) -> FloatArray:
+        """s M (x - target)."""
+        self.iterate = x  # Ipopt asks for gradients at accepted iterates alone
+        return (self.weights * (x.reshape(-1, 3) - self.target)).ravel()
+
+    def constraints(self, x: FloatArray) -> FloatArray:
+        """||y_i||^2."""
+        squares: FloatArray = np.sum(self.stretched(x) ** 2, axis=1)
+        return squares
+
+    def jacobianstructure(self) -> tuple[IntArray, IntArray]:
+        """Row and column indices."""
+        return self.structure.jacobian
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """2 y_i g_iv, three entries a non-zero of G."""
+        g = 2 * self.unit * self.structure.value[:, None]
+        entries: FloatArray = g * self.stretched(x)[self.structure.row]
+        return entries.ravel()
+
+    def hessianstructure(self) -> tuple[IntArray, IntArray]:
+        """Row and column indices of the lower triangle."""
+        return self.structure.hessian
+
+    def hessian(self, x: FloatArray, multipliers: FloatArray, factor: float) -> FloatArray:
+        """Of factor times the objective plus multipliers times constraints."""
+        values = self.unit**2 * (self.structure.products @ multipliers)
+        values[self.structure.diagonal] += factor * self.weights[:, 0]
+        return np.repeat(values, 3)
+
+    def intermediate(self, algorithm: int, iteration: int, *progress: float) -> bool:
+        """Whether to go on; called once an iteration."""
+        self.iterations = iteration
+        self.monitor(self.positions(self.iterate))
+        return not self.deadline.passed

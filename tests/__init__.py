@@ -1,0 +1,1 @@
+"""Tests: theorems, invariances and analytic answers rather than snapshots."""

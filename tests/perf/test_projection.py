@@ -1,0 +1,47 @@
+"""pytest-benchmark: every solver on a recorded frame of the swing; run by `make perf`."""
+
+from __future__ import annotations
+
+from itertools import islice
+
+import pytest
+
+from strainbench import certify
+from strainbench.discovery import find_solver, list_solvers
+from strainbench.reference import REFERENCE_SOLVER
+from strainbench.solver import run_solver, warm_up
+from scenarios.swing import Swing
+
+TOLERANCE = 1e-6
+NAMES = [e.name for e in list_solvers() if not e.unavailable]
+
+
+@pytest.fixture(scope="module", params=[(10, 0.01), (20, 0.01)], ids=["10 at 1%", "20 at 1%"])
+def frame(request):
+    """The candidate of the tenth step, as the reference solver's run reaches it."""
+    resolution, limit = request.param
+    scene = Swing(resolution=resolution, limit=limit)
+    problem, reference = scene.problem(), find_solver(REFERENCE_SOLVER)
+    state = reference.prepare(problem)
+    targets = []
+
+    def project(target):
+        targets.append(target)
+        return run_solver(reference, problem.with_target(target), state, TOLERANCE).positions
+
+    list(islice(scene.play(project), 10))
+    return problem.with_target(targets[-1])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_projection(benchmark, frame, name):
+    solver = find_solver(name)
+    warm_up(solver, frame, TOLERANCE)
+    state = solver.prepare(frame)
+    solution = benchmark.pedantic(
+        run_solver, args=(solver, frame, state, TOLERANCE, 10.0), rounds=5, warmup_rounds=1
+    )
+    found = certify(frame, solution.positions)
+    benchmark.extra_info.update(
+        {k: v for k, v in vars(found).items() if k != "reason"} | {"status": solution.status}
+    )

@@ -1,0 +1,62 @@
+"""The contract that every scenario keeps; new scenarios are found by themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import islice
+
+import numpy as np
+import pytest
+
+from strainbench.discovery import find_scenario, list_scenarios
+
+NAMES = [e.name for e in list_scenarios()]
+
+
+@pytest.fixture(params=NAMES)
+def scene(request):
+    return find_scenario(request.param)(resolution=4)
+
+
+def test_docstring_names_scene_and_paper(scene):
+    assert scene.__doc__.split("\n")[0].rstrip(".").endswith(")")
+
+
+def test_the_initial_state_is_within_the_limits(scene):
+    problem = scene.problem()
+    assert not np.any(problem.violations(problem.target))
+
+
+def test_resolution_is_cells_a_side(scene):
+    finer = replace(scene, resolution=8)
+    assert len(finer.problem().elements) == 4 * len(scene.problem().elements)
+
+
+def test_every_step_asks_for_a_projection_and_converges(scene):
+    seen = []
+
+    def project(target):
+        seen.append(target)
+        return target
+
+    reports = list(islice(scene.play(project), 3))
+    assert len(seen) >= 3
+    assert all(r.newton_converged for r in reports)
+    assert all(np.all(np.isfinite(t)) for t in seen)
+
+
+def test_playing_twice_gives_the_same_candidates(scene):
+    def record():
+        seen = []
+        list(islice(scene.play(lambda t: seen.append(t) or t), 3))
+        return seen
+
+    assert all(np.array_equal(a, b) for a, b in zip(record(), record(), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("resolution", 0), ("limit", 0.0), ("limit", 1.01), ("directions", 0)]
+)
+def test_wrong_values_are_named(scene, key, value):
+    with pytest.raises(ValueError, match=f"{key} is {value}"):
+        replace(scene, **{key: value})

@@ -1,0 +1,81 @@
+"""What the README and CONTRIBUTING tell a person to type works."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
+
+
+def blocks(text, language):
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+COMMANDS = [
+    line.removeprefix("$ ")
+    for block in blocks(README, "console")
+    for line in block.splitlines()
+    if line.startswith("$ strainbench")
+]
+
+
+def test_there_are_commands():
+    assert len(COMMANDS) >= 4
+
+
+def test_commands_in_the_order_of_the_readme(tmp_path):
+    (tmp_path / "mine.py").write_text(blocks(CONTRIBUTING, "python")[0])
+    for command in COMMANDS:
+        done = subprocess.run(
+            [sys.executable, "-m", *shlex.split(command)],
+            cwd=tmp_path,
+            env={**os.environ, "PYTHONWARNINGS": "error"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
+    report = tmp_path / "results/local/first"
+    for name in ("table1.csv", "table1.md", "table1.tex", "speed-accuracy.svg", "index.html"):
+        assert (report / name).stat().st_size > 0
+
+
+def test_python_example():
+    exec(compile(blocks(README, "python")[0], "README.md", "exec"), {})
+
+
+def test_example_solver_is_short_and_honest(tmp_path):
+    source = blocks(CONTRIBUTING, "python")[0]
+    assert len(source.strip().splitlines()) <= 30
+    path = tmp_path / "mine.py"
+    path.write_text(source)
+    from strainbench import Solver, certify, solve
+    from strainbench.discovery import load_file
+    from tests.problems import random_problem
+    import numpy as np
+
+    (solver,) = load_file(str(path), Solver)
+    problem = random_problem(np.random.default_rng(0), directions=4, limit=0.1)
+    assert certify(problem, solve(problem, solver()).positions).outcome == "feasible"
+
+
+@pytest.mark.parametrize("target", re.findall(r"`make ([a-z-]+)`", README))
+def test_make_targets_exist(target):
+    assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
+
+
+def test_the_map_names_files_that_exist():
+    (tree,) = blocks(README, "text")
+    for line in tree.splitlines():
+        name = line.split("  ")[0].strip()
+        if name:
+            assert (ROOT / name).exists(), name
