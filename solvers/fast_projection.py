@@ -120,7 +120,7 @@ class FastProjection(Solver):
         state: Rows,
         x: FloatArray,
         dx: FloatArray,
-        C: FloatArray,  # noqa: N803
+        C: FloatArray,
         slope: float,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """x + t dx, with its y and C; `slope` is dphi/dt at t = 0."""
@@ -173,7 +173,7 @@ class Rows:
             (entries.ravel(), places.ravel(), starts), shape=(len(rows), len(self._mass))
         )
 
-    def newton_step(self, J: sp.csr_array, C: FloatArray, eps_D: FloatArray) -> FloatArray:  # noqa: N803
+    def newton_step(self, J: sp.csr_array, C: FloatArray, eps_D: FloatArray) -> FloatArray:
         """(3 n,) dx of the normal equations."""
         A = sp.diags_array(self._mass) + J.T @ (sp.diags_array(1 / eps_D) @ J)
         factor = splu(
@@ -185,7 +185,7 @@ class Rows:
         step: FloatArray = factor.solve(-(J.T @ (C / eps_D)))
         return step
 
-    def merit(self, C: FloatArray) -> float:  # noqa: N803
+    def merit(self, C: FloatArray) -> float:
         """phi, over the rows that can move."""
         with np.errstate(over="ignore"):
             squares = np.maximum(C[self.movable], 0.0) ** 2

@@ -13,7 +13,7 @@ For each row i of G in turn, in mesh order, with y = sum_k g_k x_k and w_k = 1/m
 3. stop once the largest violation of all rows at the same positions is below the tolerance:
    looked at after a sweep that found no row above it, and at every look at the clock.
 
-The answer is a feasible point near the target, not the closest one: see `dykstra`.
+The answer is a feasible point near the target, not the closest one.
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ class PluginRef:
     label : with what sets it apart from the defaults
     parameters : all its fields
     path : of the file that it came from, or None for one of ours
+    content : digest of that file, when the run was planned: an edited file is another plug-in
     unavailable : why it cannot be loaded, or None
     """
 
@@ -30,13 +31,15 @@ class PluginRef:
     label: str
     parameters: tuple[tuple[str, object], ...] = ()
     path: str | None = None
+    content: str = ""
     unavailable: str | None = None
 
     @classmethod
     def of(cls, plugin: Solver | Scenario, path: str | None = None) -> PluginRef:
         """A reference to `plugin`, from the file at `path` unless it is ours."""
         label = plugin.label if isinstance(plugin, Solver) else plugin.name
-        return cls(plugin.name, label, tuple(plugin.parameters.items()), path)
+        content = _digest(Path(path).read_text()) if path else ""
+        return cls(plugin.name, label, tuple(plugin.parameters.items()), path, content)
 
     def solver(self) -> Solver:
         """Load it as a solver."""
@@ -57,9 +60,8 @@ class PluginRef:
 
     @property
     def identity(self) -> list[object]:
-        """Name, parameters, and the content of a file from outside: an edited file is another."""
-        content = Path(self.path).read_bytes() if self.path else b""
-        return [self.name, dict(self.parameters), hashlib.sha256(content).hexdigest()[:16]]
+        """What sets it apart from any other."""
+        return [self.name, dict(self.parameters), self.content]
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def _classes(module: ModuleType, base: type[Plugin]) -> list[type[Plugin]]:
         for c in vars(module).values()
         if inspect.isclass(c)
         and issubclass(c, base)
-        and c.__module__ == module.__name__
+        and (c.__module__ + ".").startswith(module.__name__ + ".")
         and not inspect.isabstract(c)
     ]
 
@@ -77,7 +77,10 @@ def _stems(package: str) -> list[str]:
 
 def _summary(package: str, stem: str) -> tuple[str, str]:
     """Method and paper of a module that cannot be imported, read from its text."""
-    path = Path(_package(package).__path__[0]) / f"{stem}.py"
+    folder = Path(_package(package).__path__[0])
+    path = (
+        folder / f"{stem}.py" if (folder / f"{stem}.py").exists() else folder / stem / "__init__.py"
+    )
     return method_and_paper(ast.get_docstring(ast.parse(path.read_text())))
 
 
@@ -107,6 +110,21 @@ def list_scenarios() -> list[Entry]:
     return [Entry(c.name, *method_and_paper(c.__doc__)) for c in classes]
 
 
+def _ours(name: str) -> Solver | None:
+    """Our solver or variant of that name, importing no more than may hold it."""
+    for stem in sorted(_stems("solvers"), key=len, reverse=True):
+        if name != stem.replace("_", "-") and not name.startswith(stem.replace("_", "-") + "-"):
+            continue
+        try:
+            module = _load("solvers", stem)
+        except UnavailableError as error:
+            raise UnavailableError(f"solver {name} is unavailable: {error}") from error
+        for solver in (v for c in _classes(module, Solver) for v in _variants(c)):
+            if solver.label == name:
+                return solver
+    return None
+
+
 def find_solver(name: str) -> Solver:
     """The solver of a name or of a variant's name.
 
@@ -117,17 +135,8 @@ def find_solver(name: str) -> Solver:
     ValueError
         If there is none of that name; the message lists those there are.
     """
-    stems = sorted((s for s in _stems("solvers")), key=len, reverse=True)
-    for stem in stems:
-        if name != stem.replace("_", "-") and not name.startswith(stem.replace("_", "-") + "-"):
-            continue
-        try:
-            module = _load("solvers", stem)
-        except UnavailableError as error:
-            raise UnavailableError(f"solver {name} is unavailable: {error}") from error
-        for solver in (v for c in _classes(module, Solver) for v in _variants(c)):
-            if solver.label == name:
-                return solver
+    if solver := _ours(name):
+        return solver
     valid = ", ".join(e.name for e in list_solvers())
     raise ValueError(f"no solver called {name!r}; valid are {valid}, or the path of a .py file")
 
@@ -168,12 +177,10 @@ def load_file(path: str, base: type[Plugin]) -> list[type[Plugin]]:
     classes = _classes(module, base)
     if not classes:
         raise ValueError(f"{path} defines no {kind}: a subclass of strainbench.{base.__name__}")
-    taken = {s.replace("_", "-") for s in _stems(f"{kind}s")}
     for c in classes:
         if not isinstance(getattr(c, "name", None), str):
             raise ValueError(f'{path}: the {kind} {c.__name__} has no name = "..."')
-        if c.name in taken:
-            raise ValueError(
-                f"{path}: the name {c.name!r} is taken by our own {kind}; choose another"
-            )
+        if c.name in [t.replace("_", "-") for t in _stems(f"{kind}s")] or _ours(c.name):
+            taken = f"the name {c.name!r} is taken by our own {kind}"
+            raise ValueError(f"{path}: {taken}; choose another")
     return classes

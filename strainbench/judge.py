@@ -92,7 +92,7 @@ def _run_row(
 ) -> dict[str, object]:
     by_name = {e["event"]: e for e in events}
     steps = [e for e in events if e["event"] == "step"]
-    seconds = [e["seconds"] for e in projections]
+    seconds = [e["seconds"] for e in projections] + _cut_off(cell, events, ending)
     outcome, reason = _outcome(cell, events, certificates, len(steps), ending)
     loaded = by_name.get("loaded", {})
     row: dict[str, object] = identity(cell) | {
@@ -123,6 +123,17 @@ def _run_row(
         "play_seconds": sum(seconds) + sum(e["ie_seconds"] for e in steps),
     }
     return row
+
+
+def _cut_off(cell: Cell, events: list[dict[str, Any]], ending: str) -> list[float]:
+    """Seconds in a projection that was stopped from outside at the time limit: at least so long."""
+    last = next(
+        (e for e in reversed(events) if e["event"] in ("setup", "step", "projection")), None
+    )
+    if last is None or cell.time_limit is None or not ending.startswith("time limit"):
+        return []
+    begun = next(e["at"] for e in events if e["event"] == "started")
+    return [max(0.0, begun + cell.time_limit - last["at"])]
 
 
 def identity(cell: Cell) -> dict[str, object]:

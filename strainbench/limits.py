@@ -19,14 +19,18 @@ SAME_DIRECTION = 1e-9
 """Directions whose unit vectors differ by less than this, up to sign, are one direction."""
 
 
-def frozen_array(name: str, values: ArrayLike, ndim: int) -> FloatArray:
+def frozen_array(name: str, values: ArrayLike, *ndims: int) -> FloatArray:
     """A read-only float copy of `values`, or ValueError naming the field, index and value."""
     try:
-        array = np.array(values, dtype=np.float64)
+        given = np.array(values)
+        if not np.isrealobj(given) or given.dtype.kind in "USO":
+            raise ValueError(f"entries of type {given.dtype}")
+        array = given.astype(np.float64)
     except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: not an array of numbers ({error})") from None
-    if array.ndim != ndim:
-        raise ValueError(f"{name}: expected {ndim} dimensions, got shape {array.shape}")
+        raise ValueError(f"{name}: not an array of real numbers ({error})") from None
+    if array.ndim not in ndims:
+        valid = " or ".join(map(str, ndims))
+        raise ValueError(f"{name}: expected {valid} dimensions, got shape {array.shape}")
     bad = np.argwhere(~np.isfinite(array))
     if len(bad):
         index = tuple(bad[0].tolist())
@@ -60,10 +64,10 @@ class StretchLimits:
 
     def __post_init__(self) -> None:
         directions = frozen_array("limits.directions", self.directions, 2)
-        bounds = frozen_array("limits.bounds", self.bounds, np.ndim(self.bounds))
+        bounds = frozen_array("limits.bounds", self.bounds, 1, 2)
         if len(directions) == 0:
             raise ValueError("limits.directions: at least one direction is needed")
-        if bounds.ndim not in (1, 2) or bounds.shape[-1] != len(directions):
+        if bounds.shape[-1] != len(directions):
             raise ValueError(
                 f"limits.bounds: shape {bounds.shape} does not match {len(directions)} directions; "
                 f"valid are ({len(directions)},) and (elements, {len(directions)})"
@@ -101,7 +105,7 @@ class StretchLimits:
         """Any curve, by its samples: `angles` (m,) [rad], `bounds` (m,) or (e, m)."""
         alpha = frozen_array("limits.angles", angles, 1)
         directions = np.column_stack([np.cos(alpha), np.sin(alpha)])
-        return cls(directions, np.asarray(bounds, dtype=np.float64))
+        return cls(directions, frozen_array("limits.bounds", bounds, 1, 2))
 
     @classmethod
     def from_csv(cls, path: str | Path) -> StretchLimits:
@@ -130,8 +134,11 @@ def _distinct(directions: FloatArray, bounds: FloatArray) -> list[int]:
     """Indices of the distinct directions: a curve given from -90 to 90 degrees has one twice."""
     keep: list[int] = []
     for j, direction in enumerate(directions):
-        cosines = np.abs(directions[keep] @ direction)
-        twins = [k for k, c in zip(keep, cosines, strict=True) if c > 1 - SAME_DIRECTION]
+        others = directions[keep]
+        apart = np.minimum(
+            np.linalg.norm(others - direction, axis=1), np.linalg.norm(others + direction, axis=1)
+        )
+        twins = [k for k, distance in zip(keep, apart, strict=True) if distance < SAME_DIRECTION]
         if not twins:
             keep.append(j)
         elif not np.array_equal(bounds[..., twins[0]], bounds[..., j]):

@@ -7,7 +7,7 @@ from dataclasses import fields
 from itertools import product
 from pathlib import Path
 from types import UnionType
-from typing import Any, get_args, get_type_hints
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 from strainbench.cell import Cell, PluginRef
 from strainbench.discovery import (
@@ -44,7 +44,7 @@ def parse_settings(words: Iterable[str]) -> Choices:
 
 def parse_value(owner: str, key: str, hint: Any, text: str) -> object:
     """A value of a field's type; percentages are numbers too: 1% is 0.01."""
-    kinds = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+    kinds = get_args(hint) if get_origin(hint) in (UnionType, Union) else (hint,)
     try:
         if type(None) in kinds and text.lower() == "none":
             return None
@@ -101,12 +101,23 @@ def plan_solvers(words: Sequence[str], choices: Choices) -> list[PluginRef]:
     for name in dict.fromkeys(names):
         path = str(Path(name).resolve()) if is_file(name) else None
         try:
-            found = [c() for c in load_file(name, Solver)] if path else [find_solver(name)]
+            found = from_file(name) if path else [find_solver(name)]
         except UnavailableError as error:
             refs.append(PluginRef(name, name, unavailable=str(error)))
             continue
         refs += [PluginRef.of(v, path) for s in found for v in variations(s, choices, False)]
     return list(dict.fromkeys(refs))
+
+
+def from_file(path: str) -> list[Solver]:
+    """The solvers of a file, as they are by default."""
+    found = []
+    for kind in load_file(path, Solver):
+        try:
+            found.append(kind())
+        except TypeError as error:
+            raise ValueError(f"{path}: every field needs a default ({error})") from None
+    return found
 
 
 def plan(
@@ -129,7 +140,8 @@ def plan(
         raise ValueError(f"--mode {mode}: valid are {', '.join(MODES)}")
     if steps < 1:
         raise ValueError(f"--steps {steps}: a whole number above 0 is valid")
-    for name, values in (("--tolerance", tolerances), ("--time-limit", [time_limit or 1.0])):
+    times = [] if time_limit is None else [time_limit]
+    for name, values in (("--tolerance", tolerances), ("--time-limit", times)):
         for value in values:
             if not 0 < value < float("inf"):
                 raise ValueError(f"{name} {value}: a number above 0 is valid")
@@ -141,7 +153,8 @@ def plan(
         if owner and owner not in owners:
             valid = ", ".join(sorted(owners))
             raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
-    return [
+    cells = [
         Cell(scene, method, mode, steps, tolerance, time_limit)
         for scene, method, tolerance in product(scenes, methods, tolerances)
     ]
+    return list({cell.key: cell for cell in cells}.values())

@@ -26,7 +26,10 @@ IntArray = NDArray[np.int64]
 
 def _index_array(name: str, values: ArrayLike, ndim: int, vertices: int) -> IntArray:
     """A read-only copy of vertex indices, or ValueError naming the field, index and value."""
-    array = np.array(values)
+    try:
+        array = np.array(values)
+    except ValueError as error:
+        raise ValueError(f"{name}: not an array of vertex indices ({error})") from None
     if array.size == 0:
         array = array.astype(np.int64)
     if array.ndim != ndim:
@@ -40,6 +43,11 @@ def _index_array(name: str, values: ArrayLike, ndim: int, vertices: int) -> IntA
             f"{name}{list(index)} is {array[index]}: valid vertex indices are 0 to {vertices - 1}"
         )
     array = array.astype(np.int64)
+    array.setflags(write=False)
+    return array
+
+
+def _read_only(array: FloatArray) -> FloatArray:
     array.setflags(write=False)
     return array
 
@@ -72,7 +80,7 @@ def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, F
         )
     inverse = np.linalg.inv(edges)
     gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-    return gradients, np.abs(determinant) / (2 if dim == 2 else 6)
+    return _read_only(gradients), _read_only(np.abs(determinant) / (2 if dim == 2 else 6))
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,12 +214,14 @@ class Problem:
     @cached_property
     def free(self) -> IntArray:
         """Indices of the vertices that are not pinned."""
-        return np.setdiff1d(np.arange(self.vertices), self.pinned)
+        free = np.setdiff1d(np.arange(self.vertices), self.pinned)
+        free.setflags(write=False)
+        return free
 
     @cached_property
     def weights(self) -> FloatArray:
         """(n,) diagonal of M: the masses, or ones."""
-        return np.ones(self.vertices) if self.mass is None else self.mass
+        return _read_only(np.ones(self.vertices)) if self.mass is None else self.mass
 
     @property
     def least_weight(self) -> float:
@@ -227,32 +237,35 @@ class Problem:
     @cached_property
     def row_vertices(self) -> IntArray:
         """(rows, k) vertices of each row of G; row e m + j is element e, direction j."""
-        return np.repeat(self.elements, len(self.limits.directions), axis=0)
+        vertices = np.repeat(self.elements, len(self.limits.directions), axis=0)
+        vertices.setflags(write=False)
+        return vertices
 
     @cached_property
     def row_coefficients(self) -> FloatArray:
         """(rows, k) entries B_k . d of each row of G [1/m]."""
         per_element: FloatArray = np.einsum("ekc,mc->emk", self.gradients, self.limits.directions)
-        return per_element.reshape(self.rows, -1)
+        return _read_only(per_element.reshape(self.rows, -1))
 
     @cached_property
     def G(self) -> sp.csr_array:  # noqa: N802
         """(rows, n) sparse: (G x)_i = F_e d, the deformed direction of constraint i."""
         k = self.elements.shape[1]
-        return sp.csr_array(
-            (
-                self.row_coefficients.ravel(),
-                self.row_vertices.ravel(),
-                np.arange(0, self.rows * k + 1, k),
-            ),
+        starts = np.arange(0, self.rows * k + 1, k)
+        G = sp.csr_array(
+            (self.row_coefficients.ravel(), self.row_vertices.ravel(), starts),
             shape=(self.rows, self.vertices),
+            copy=True,
         )
+        G.sort_indices()
+        G.data.setflags(write=False)
+        return G
 
     @cached_property
     def bounds(self) -> FloatArray:
         """(rows,) largest stretch b_i of each row of G."""
         shape = (len(self.elements), len(self.limits.directions))
-        return np.broadcast_to(self.limits.bounds, shape).reshape(-1).copy()
+        return _read_only(np.broadcast_to(self.limits.bounds, shape).reshape(-1).copy())
 
     def stretches(self, positions: FloatArray) -> FloatArray:
         """(rows,) stretch ||(G x)_i|| of every limited direction at `positions` (n, 3)."""

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 SCHEMA = 1
+LONGEST_TEXT = 10_000  # characters of one field
 RUNS, STEPS, MACHINES = "runs.csv", "steps.csv", "machines.json"
 
 RUN_COLUMNS = (
@@ -110,9 +111,11 @@ def read_rows(path: Path, columns: Sequence[str]) -> list[Row]:
     """
     if not path.exists():
         return []
-    text = path.read_text(errors="replace")
+    text = path.read_bytes().decode(errors="replace")
+    if not text:
+        return []
     repair = "nothing was changed; mend or move the file, or give another --results"
-    lines = list(csv.reader(io.StringIO(text)))
+    lines = list(csv.reader(io.StringIO(text, newline="")))
     if not lines or lines[0] != list(columns):
         raise RecordsError(
             f"{path}, line 1: the header is not that of schema {SCHEMA}, which starts "
@@ -140,11 +143,18 @@ def append_rows(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, 
     writer = csv.DictWriter(buffer, columns, lineterminator="\n")
     if not path.exists() or path.stat().st_size == 0:
         writer.writeheader()
-    writer.writerows(rows)
-    with path.open("a") as file:
+    writer.writerows({k: _plain(v) for k, v in row.items()} for row in rows)
+    with path.open("a", encoding="utf-8", newline="") as file:
         file.write(buffer.getvalue())
         file.flush()
         os.fsync(file.fileno())
+
+
+def _plain(value: object) -> object:
+    """Text on one line, of sane length, that UTF-8 can hold; other values as they are."""
+    if not isinstance(value, str):
+        return value
+    return " ".join(value.encode(errors="replace").decode().split())[:LONGEST_TEXT]
 
 
 def latest_runs(folder: Path) -> dict[str, Row]:
@@ -165,12 +175,12 @@ def remember_machine(folder: Path, name: str, facts: Mapping[str, object]) -> No
 def read_machines(folder: Path) -> dict[str, dict[str, object]]:
     """Machine names and their facts."""
     path = folder / MACHINES
+    if not path.exists():
+        return {}
     try:
-        machines: dict[str, dict[str, object]] = (
-            json.loads(path.read_text()) if path.exists() else {}
-        )
-    except json.JSONDecodeError as error:
-        raise RecordsError(
-            f"{path}, line {error.lineno}: not JSON; mend or move the file"
-        ) from None
+        machines = json.loads(path.read_bytes())
+    except ValueError as error:
+        raise RecordsError(f"{path}: not JSON ({error}); mend or move the file") from None
+    if not isinstance(machines, dict) or not all(isinstance(f, dict) for f in machines.values()):
+        raise RecordsError(f"{path}: not a table of machines and their facts; mend or move it")
     return machines

@@ -91,12 +91,15 @@ def certify(
     x = np.array(positions, dtype=np.float64)
     x[problem.pinned] = problem.target[problem.pinned]
     ref = reference_of(problem) if reference is None else reference
-    v: FloatArray = problem.violations(x)
-    objective = problem.objective(x)
+    with np.errstate(over="ignore"):  # a diverged answer may be infinitely wrong
+        v: FloatArray = problem.violations(x)
+        objective = problem.objective(x)
+        apart = np.linalg.norm(x - ref.positions)
+        distance = float(np.linalg.norm(x - ref.positions, axis=1).max())
     true_gap = max(0.0, objective + float(ref.multiplier_norms @ v) - ref.lower_bound)
-    relative_gap = true_gap / max(ref.lower_bound, objective_floor(problem))
+    scale = max(ref.lower_bound, objective_floor(problem))
+    relative_gap = true_gap / scale if true_gap else 0.0
     radius = float(np.sqrt(2 * true_gap / problem.least_weight))
-    apart = np.linalg.norm(x - ref.positions)
     worst = float(v.max())
     outcome, reason = _outcome(ref, worst, relative_gap, violation, gap)
     bound = float(np.fmin(apart, radius)) + ref.error
@@ -108,7 +111,7 @@ def certify(
         objective=objective,
         lower_bound=ref.lower_bound,
         relative_gap=relative_gap,
-        distance=float(np.linalg.norm(x - ref.positions, axis=1).max()),
+        distance=distance,
         distance_bound=min(bound, float(radius)) if worst == 0 else bound,
         reference_error=ref.error,
         active_constraints=ref.active_constraints,
@@ -117,7 +120,10 @@ def certify(
 
 def _unusable(problem: Problem, positions: FloatArray) -> str | None:
     """Why an answer cannot be judged at all, or None."""
-    array = np.asarray(positions)
+    try:
+        array = np.asarray(positions)
+    except ValueError as error:
+        return f"positions that are no array: {error}"
     if array.shape != problem.target.shape:
         return f"positions of shape {array.shape}, not {problem.target.shape}"
     if not np.issubdtype(array.dtype, np.number) or np.iscomplexobj(array):
@@ -129,8 +135,9 @@ def _unusable(problem: Problem, positions: FloatArray) -> str | None:
 
 
 def _largest_singular_value(problem: Problem, x: FloatArray) -> float:
-    F = problem.deformation_gradients(x)
-    return float(np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, 1, 2) @ F)[:, -1].max()))
+    size = max(1.0, float(np.abs(x).max()))  # or the squares of a diverged answer overflow
+    F = problem.deformation_gradients(x / size)
+    return size * float(np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, 1, 2) @ F)[:, -1].max()))
 
 
 def _outcome(

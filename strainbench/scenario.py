@@ -99,7 +99,7 @@ class ClothScenario(Scenario):
         if self.integrator not in INTEGRATORS:
             valid = ", ".join(INTEGRATORS)
             raise ValueError(f"integrator is {self.integrator!r}: valid are {valid}")
-        if not self.step > 0:
+        if not 0 < self.step < float("inf"):
             raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
         if self.norm not in ("unweighted", "mass"):
             raise ValueError(f"norm is {self.norm!r}: valid are unweighted, mass")

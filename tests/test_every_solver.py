@@ -87,7 +87,8 @@ def test_a_feasible_target_is_its_own_answer(name):
     problem = stretched_triangle(limit=2.0)
     solution = solve(problem, available(name))
     assert np.abs(solution.positions - problem.target).max() < exactness(name)
-    assert certify(problem, solution.positions).outcome == "optimal"
+    outcomes = ["optimal", "feasible"] if name in UNSCALED else ["optimal"]
+    assert certify(problem, solution.positions).outcome in outcomes
 
 
 @pytest.mark.parametrize("name", LIMITING)
@@ -109,7 +110,9 @@ def test_pins_stay_and_the_problem_is_not_changed(name):
     assert solution.positions[problem.pinned] == pytest.approx(before[problem.pinned], abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["clarabel", "clarabel-default", "clarabel-paper", "cvxpy", "ipopt"])
+@pytest.mark.parametrize(
+    "name", ["clarabel", "clarabel-default", "clarabel-paper", "cvxpy", "ipopt"]
+)
 def test_multipliers_are_stationary(name):
     problem = random_problem(np.random.default_rng(9), directions=4, limit=0.05)
     solution = solve(problem, available(name))

@@ -58,10 +58,11 @@ def test_example_solver_is_short_and_honest(tmp_path):
     assert len(source.strip().splitlines()) <= 30
     path = tmp_path / "mine.py"
     path.write_text(source)
+    import numpy as np
+
     from strainbench import Solver, certify, solve
     from strainbench.discovery import load_file
     from tests.problems import random_problem
-    import numpy as np
 
     (solver,) = load_file(str(path), Solver)
     problem = random_problem(np.random.default_rng(0), directions=4, limit=0.1)

@@ -98,7 +98,7 @@ def test_an_interrupt_keeps_what_is_finished(tmp_path):
 
     with pytest.raises(KeyboardInterrupt):
         run(tmp_path, ["none", "clarabel"], observer=Interrupt())
-    assert [row["solver"] for row in latest_runs(tmp_path).values()][0] == "none"
+    assert next(row["solver"] for row in latest_runs(tmp_path).values()) == "none"
     _, found = run(tmp_path, ["none", "clarabel"])
     assert set(found) == {"none", "clarabel"}
 

@@ -12,7 +12,8 @@ UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
 EXPLANATION = """\
 Seconds are means over projections of the time inside the solver, set-up apart, measured by the
 suite. `*`: some steps did not converge (the referee finds a violation above {violation}) or the
-cell's time ran out, the steps done in brackets; `-`: no usable answer. Beside each time stands
+cell's time ran out, the steps done in brackets and the time spent on the last one counted as far
+as it went; `-`: no usable answer. Beside each time stands
 what the referee found, at its worst over all steps: largest violation, relative gap to the
 certified lower bound, largest distance of a vertex from the certified optimum in mm. **Bold**:
 optimal on every step (violation at most {violation}, relative gap at most {gap})."""
