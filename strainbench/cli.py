@@ -84,7 +84,9 @@ def run(
     memory_limit: Annotated[
         float | None, typer.Option(help="MB a cell; by default 3/4 of the machine's, shared")
     ] = None,
-    jobs: Annotated[int, typer.Option(help="cells at a time; the referee takes one more core")] = 1,
+    jobs: Annotated[
+        int, typer.Option(help="cells at a time; with more than one, times are disturbed")
+    ] = 1,
     threads: Annotated[int, typer.Option(help="threads a solver")] = 1,
     results: Annotated[Path, typer.Option(help="folder of the results")] = Path(
         "results/local/run"
@@ -191,7 +193,7 @@ def _print_summary(summary: Summary, planned: int, results: Path) -> None:
     console.print(
         f"{summary.cells} cells in {summary.wall:.1f} s: solvers and physics {summary.play:.1f} s, "
         f"processes' start {summary.start:.1f} s, suite overhead {100 * summary.overhead:.1f}% "
-        f"of the wall time; the referee worked {summary.judging:.1f} s beside them",
+        f"of the wall time; the referee worked {summary.judging:.1f} s while processes started",
         highlight=False,
     )
     console.print(f"results in {results}", highlight=False)

@@ -12,7 +12,7 @@ import psutil
 from pebble import ProcessExpired, ProcessPool
 
 from strainbench.cell import Cell
-from strainbench.play import EVENTS, play, read_events
+from strainbench.play import EVENTS, GO, play, read_events
 
 START_LIMIT = 180.0  # [s] for imports and compilation, before a cell's clock starts
 GRACE = 2.0  # [s] after the time limit in which a solver may stop by itself
@@ -25,6 +25,7 @@ class Running:
     Attributes
     ----------
     steps : time steps done so far
+    released : whether its clock may have started
     ending : once ended, why it was ended from outside, or ""
     """
 
@@ -35,6 +36,7 @@ class Running:
     scheduled: float = field(default_factory=time.time)
     events: list[dict[str, Any]] = field(default_factory=list)
     steps: int = 0
+    released: bool = False
     ending: str = ""
     _size: int = 0
 
@@ -64,10 +66,26 @@ class Running:
             self.future.cancel()
         return False
 
+    def is_ready(self) -> bool:
+        """Whether it has started, imported and compiled, and waits to be released."""
+        return not self.released and self._when("ready") is not None
+
+    def release(self) -> None:
+        """Let its clock start."""
+        (self.folder / GO).touch()
+        self.released = True
+
     def start_seconds(self) -> float:
-        """From the schedule to the first projection: process start, imports, compilation."""
-        begun = next((e["at"] for e in self.events if e["event"] == "started"), time.time())
-        return float(begun - self.scheduled)
+        """Process start, imports, compilation."""
+        return (self._when("ready") or time.time()) - self.scheduled
+
+    def play_seconds(self) -> float:
+        """Physics, set-up and solver."""
+        begun = self._when("started")
+        return (self._when("ended") or time.time()) - begun if begun else 0.0
+
+    def _when(self, event: str) -> float | None:
+        return next((float(e["at"]) for e in self.events if e["event"] == event), None)
 
     def _read_events(self) -> None:
         path = self.folder / EVENTS
@@ -87,8 +105,8 @@ class Running:
 
     def _limit_reached(self) -> str:
         limit = self.cell.time_limit
-        begun = next((e["at"] for e in self.events if e["event"] == "started"), None)
-        if begun is None and time.time() - self.scheduled > START_LIMIT:
+        begun = self._when("started")
+        if self._when("ready") is None and time.time() - self.scheduled > START_LIMIT:
             return f"hung for {START_LIMIT:g} s before its first projection"
         if begun is not None and limit is not None and time.time() - begun > limit + GRACE:
             return f"time limit of {limit:g} s"

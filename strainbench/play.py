@@ -26,7 +26,7 @@ from strainbench.problem import Problem
 from strainbench.scenario import StepReport
 from strainbench.solver import Solver, run_solver, warm_up
 
-EVENTS, FRAMES = "events.jsonl", "frames.bin"
+EVENTS, FRAMES, GO = "events.jsonl", "frames.bin", "go"
 
 
 class Stop(Exception):  # noqa: N818
@@ -75,7 +75,7 @@ def play(cell: Cell, folder: Path, recording: Path | None) -> None:
     with (folder / "output.txt").open("w") as output:
         _redirect(output)
         try:
-            _play(cell, journal, recording)
+            _play(cell, folder, journal, recording)
         except Stop as stop:
             journal.write("failed", reason=str(stop))
         except Exception as error:  # the one place where a solver's own error becomes a row
@@ -91,7 +91,7 @@ def _redirect(output: IO[str]) -> None:
         os.dup2(output.fileno(), descriptor)
 
 
-def _play(cell: Cell, journal: Journal, recording: Path | None) -> None:
+def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) -> None:
     scenario, solver = cell.scenario.scenario(), cell.solver.solver()
     problem = scenario.problem()
     threads = max((pool["num_threads"] for pool in threadpool_info()), default=1)
@@ -106,6 +106,9 @@ def _play(cell: Cell, journal: Journal, recording: Path | None) -> None:
     warm_up(solver, problem, cell.tolerance)
     if recording is None:
         scenario.warm_up()
+    journal.write("ready")
+    while not (folder / GO).exists():  # until nothing else that is ours keeps the machine busy
+        time.sleep(0.002)
     journal.write("started")
     begin = time.perf_counter()
     state = solver.prepare(problem)

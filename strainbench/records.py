@@ -39,6 +39,7 @@ RUN_COLUMNS = (
     "relative_gap_max",
     "distance_max",
     "distance_bound_max",
+    "reference_error_max",
     "projections",
     "projections_violated",
     "projections_optimal",

@@ -20,6 +20,10 @@ FLOOR_MM = 1e-6
 """Distances below are drawn here: the reference itself is not known better."""
 
 
+RESOLVED: dict[str, Any] = {"color": "#777777", "linestyle": "--", "linewidth": 1}
+"""The line below which distances are from the reference, not provably from the optimum."""
+
+
 def styles(solvers: list[str]) -> dict[str, dict[str, Any]]:
     """One colour and marker a solver; no two of the first 24 share both."""
     return {
@@ -73,6 +77,9 @@ def _panel(ax: Axes, rows: pd.DataFrame, style: dict[str, dict[str, Any]], top: 
     ax.axhspan(top / 4, top * 4, color="#eeeeee", zorder=0)
     ax.set_ylim(FLOOR_MM / 3, top * 4)
     ax.text(0.02, 0.985, "no answer", transform=ax.transAxes, va="top", size=8, color="#555555")
+    resolved = 1000 * rows["reference_error_max"].max()
+    if resolved > FLOOR_MM:
+        ax.axhline(resolved, **RESOLVED)
     for _, row in rows.iterrows():
         answered = row["outcome"] != "no answer"
         seconds = row["solve_seconds_mean"]
@@ -106,4 +113,5 @@ def _legend(style: dict[str, dict[str, Any]]) -> list[Line2D]:
                 label=label,
             )
         )
+    handles.append(Line2D([], [], label="reference certified to", **RESOLVED))
     return handles

@@ -1,0 +1,91 @@
+"""The command line as a person meets it: exit status and one clear line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+from strainbench.records import RUNS
+
+RUN = ["run", "swing", "--solver", "none", "--set", "resolution=2", "--steps", "1"]
+
+
+def strainbench(*words, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "strainbench", *words],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (["run", "swim"], "no scenario called 'swim'; valid are"),
+        (["run", "swing", "--solver", "mosek"], "no solver called 'mosek'; valid are clarabel"),
+        (["run", "swing", "--set", "resolutoin=10"], "no setting 'resolutoin'; valid are"),
+        (["run", "swing", "--set", "resolution=ten"], "the value must be int"),
+        (["run", "swing", "--set", "limit=1.01"], "a strain between 0 and 1 is valid"),
+        (["run", "swing", "--set", "integrator=rk4"], "integrator is 'rk4': valid are sap"),
+        (["run", "swing", "--mode", "both"], "--mode both: valid are simulate, replay"),
+        (["run", "swing", "--steps", "0"], "--steps 0"),
+        (["run", "swing", "--jobs", "0"], "--jobs 0"),
+        (["run", "swing", "--tolerance", "tight"], "--tolerance tight"),
+        (["run", "swing", "--solver", "./nowhere.py"], "./nowhere.py: no such file"),
+        (["list", "papers"], "list papers: valid are solvers, scenarios"),
+        (["report", "--results", "nowhere"], "nowhere holds no results"),
+        (["frobnicate"], "No such command 'frobnicate'"),
+        (["run"], "Missing argument"),
+        (["run", "swing", "--frob"], "No such option: --frob"),
+    ],
+)
+def test_a_wrong_word_is_one_line_and_exit_2(words, line, tmp_path):
+    done = strainbench(*words, cwd=tmp_path)
+    assert done.returncode == 2
+    assert line in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert "Traceback" not in done.stdout
+
+
+def test_a_solvers_failure_is_data_and_exit_0(tmp_path):
+    (tmp_path / "bad.py").write_text(
+        "from strainbench import Solver\n"
+        "class Bad(Solver):\n"
+        "    'Fails (nobody)'\n"
+        "    name = 'bad'\n"
+        "    def solve(self, problem, state, **_): raise ValueError('by design')\n"
+    )
+    done = strainbench(*RUN[:2], "--solver", "bad.py", *RUN[4:], cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "ValueError: by design" in done.stdout
+
+
+def test_damaged_records_stop_a_run_and_stay(tmp_path):
+    folder = tmp_path / "results"
+    assert strainbench(*RUN, "--results", str(folder), cwd=tmp_path).returncode == 0
+    damaged = (folder / RUNS).read_text()[:-40]
+    (folder / RUNS).write_text(damaged)
+    for verb in (RUN, ["report"]):
+        done = strainbench(*verb, "--results", str(folder), cwd=tmp_path)
+        assert done.returncode == 2
+        assert "runs.csv, record 2" in done.stderr
+        assert (folder / RUNS).read_text() == damaged
+
+
+def test_a_folder_that_cannot_be_written_to(tmp_path):
+    (tmp_path / "file").write_text("")
+    done = strainbench(*RUN, "--results", "file/results", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "cannot be written to" in done.stderr
+
+
+def test_list_names_solvers_and_scenarios(tmp_path):
+    done = strainbench("list", cwd=tmp_path)
+    assert done.returncode == 0
+    for word in ("clarabel", "gauss-seidel", "swing", "Thomaszewski"):
+        assert word in done.stdout
