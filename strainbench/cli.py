@@ -35,6 +35,7 @@ app = typer.Typer(
 )
 console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
+INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
@@ -88,21 +89,29 @@ def run(
         int, typer.Option(help="cells at a time; with more than one, times are disturbed")
     ] = 1,
     threads: Annotated[int, typer.Option(help="threads a solver")] = 1,
-    results: Annotated[Path, typer.Option(help="folder of the results")] = Path(
-        "results/local/run"
-    ),
+    scheduler: Annotated[
+        str | None, typer.Option(help="address of a dask scheduler whose workers run the cells")
+    ] = None,
+    results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_RESULTS,
     rerun: Annotated[bool, typer.Option("--rerun", help="run finished cells again")] = False,
 ) -> None:
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
     for name, value in (("--jobs", jobs), ("--threads", threads)):
         if value < 1:
             raise ValueError(f"{name} {value}: a whole number above 0 is valid")
+    if memory_limit is not None and not memory_limit > 0:
+        raise ValueError(f"--memory-limit {memory_limit}: a number of MB above 0 is valid")
     cells = plan(
         scenarios, solver or ["all"], set_ or [], mode, steps, _numbers(tolerance), time_limit
     )
     memory = memory_limit or 0.75 * psutil.virtual_memory().total / 1024**2 / jobs
     settings = Settings(results, jobs, threads, memory, rerun)
     with Display() as display:
+        if scheduler:
+            from strainbench.cluster import run_on_cluster  # dask only where it is asked for
+
+            run_on_cluster(scheduler, cells, settings, display)
+            return
         summary = Runner(settings, display).run(cells)
     _print_summary(summary, len(cells), results)
 
@@ -202,15 +211,14 @@ def _print_summary(summary: Summary, planned: int, results: Path) -> None:
 def main() -> None:
     """Run the command line; exit 2 with one line for a wrong word, 130 when interrupted."""
     try:
-        app(standalone_mode=False)
+        status = app(standalone_mode=False)
     except typer.TyperException as error:
-        context = getattr(error, "ctx", None)
-        usage = f" ({context.command_path} --help lists what is valid)" if context else ""
-        errors.print(f"strainbench: {error.format_message()}{usage}")
+        message = getattr(error, "format_message", error.__str__)()
+        errors.print(f"strainbench: {message} (strainbench --help lists what is valid)")
         sys.exit(2)
     except (ValueError, RecordsError) as error:
         errors.print(f"strainbench: {error}", markup=False)
         sys.exit(2)
-    except (KeyboardInterrupt, typer.Abort):
+    if status == INTERRUPTED:  # typer has turned KeyboardInterrupt into it
         errors.print("strainbench: interrupted; every finished cell is kept, run again to resume")
-        sys.exit(130)
+    sys.exit(status or 0)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -82,6 +84,23 @@ def test_a_folder_that_cannot_be_written_to(tmp_path):
     done = strainbench(*RUN, "--results", "file/results", cwd=tmp_path)
     assert done.returncode == 2
     assert "cannot be written to" in done.stderr
+
+
+def test_an_interrupt_exits_130_and_the_run_resumes(tmp_path):
+    words = [*RUN[:2], "--solver", "none,gauss-seidel", "--set", "resolution=30", "--steps", "40"]
+    command = [sys.executable, "-m", "strainbench", *words]
+    process = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    runs = tmp_path / "results/local/run" / RUNS
+    deadline = time.monotonic() + 90
+    while not runs.exists() and time.monotonic() < deadline:
+        time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted; every finished cell is kept" in stderr
+    assert "none" in runs.read_text()
 
 
 def test_list_names_solvers_and_scenarios(tmp_path):

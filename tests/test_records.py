@@ -181,8 +181,13 @@ def damages(text):
     yield "older header", r"line 1: .*header", text.replace(",machine\n", "\n", 1)
     yield "no header", r"line 1: .*header", first + "".join(rest)
     yield "other text", r"line 1: .*header", "hello\n"
-    yield "short record", r"record 3 has 2 fields where 43", "".join([header, first, "1,b\n"])
-    yield "long record", r"record 2 has 44 fields where 43", header + first.strip() + ",more\n"
+    count = len(RUN_COLUMNS)
+    yield "short record", rf"record 3 has 2 fields where {count}", "".join([header, first, "1,b\n"])
+    yield (
+        "long record",
+        rf"record 2 has {count + 1} fields where {count}",
+        header + first.strip() + ",more\n",
+    )
     yield "blank line", r"record 3 has 0 fields", "".join([header, first, "\n", *rest])
     yield "cut-off field", r"record 4 has \d+ fields", text[: len(text) - len(rest[-1]) + 30]
     yield "cut-off end", r"last line is cut off", text[:-1]
