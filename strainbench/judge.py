@@ -106,6 +106,7 @@ def _run_row(
         if cell.mode == "simulate"
         else "",
         "iterations_mean": _of(np.mean, [e["iterations"] for e in projections]),
+        "details_mean": _mean_details([e["details"] for e in projections]),
         "max_violation": _of(max, [c.max_violation for c in certificates]),
         "max_principal_stretch": _of(max, [c.max_principal_stretch for c in certificates]),
         "relative_gap_max": _of(max, [c.relative_gap for c in certificates]),
@@ -158,6 +159,13 @@ def identity(cell: Cell) -> dict[str, object]:
         "scenario_parameters": _as_json(cell.scenario),
         "solver_parameters": _as_json(cell.solver),
     }
+
+
+def _mean_details(details: list[dict[str, float]]) -> str:
+    """The solver's own further numbers, averaged over its projections, as JSON."""
+    names = {name for d in details for name in d}
+    means = {n: float(np.mean([d[n] for d in details if n in d])) for n in sorted(names)}
+    return json.dumps(means) if means else ""
 
 
 def _as_json(plugin: PluginRef) -> str:

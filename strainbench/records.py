@@ -34,6 +34,7 @@ RUN_COLUMNS = (
     "setup_seconds",
     "ie_seconds_mean",
     "iterations_mean",
+    "details_mean",
     "max_violation",
     "max_principal_stretch",
     "relative_gap_max",

@@ -12,7 +12,17 @@ from strainbench.report.page import write_page
 from strainbench.report.table import as_latex, as_markdown, tidy
 
 WORDS = {
-    *("cell", "finished_at", "scenario", "integrator", "solver", "mode", "outcome", "reason"),
+    *(
+        "cell",
+        "finished_at",
+        "scenario",
+        "integrator",
+        "solver",
+        "mode",
+        "outcome",
+        "reason",
+        "details_mean",
+    ),
     *("scenario_parameters", "solver_parameters", "machine"),
 }
 """Columns of runs.csv that are not numbers."""

@@ -9,7 +9,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
-from strainbench.report.table import accuracy_text, explanation, groups, reasons, time_text
+from strainbench.report.table import accuracy_text, details, explanation, groups, reasons, time_text
 
 
 def write_page(
@@ -33,6 +33,7 @@ def write_page(
         time_text=time_text,
         accuracy_text=accuracy_text,
         reasons=reasons(runs),
+        details=details(runs),
         machines=machines,
     )
     path.write_text(page)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -131,12 +132,26 @@ def reasons(runs: pd.DataFrame) -> list[str]:
     ]
 
 
+def details(runs: pd.DataFrame) -> list[str]:
+    """A line for each cell whose solver tells more of its time, such as a modelling layer's."""
+    return [
+        f"{r['solver']}, {r['scenario']} {r['resolution']:.0f} at {100 * r['limit']:g}%: "
+        + ", ".join(
+            f"{k.replace('_', ' ')} {v:.4f}" for k, v in json.loads(r["details_mean"]).items()
+        )
+        for _, r in runs.iterrows()
+        if r["details_mean"]
+    ]
+
+
 def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
     """All tables, what their signs mean, the reasons of every failure, the machine."""
     parts = ["# Table 1: seconds a projection, and the accuracy reached", explanation(runs)]
     parts += [_markdown_group(group) for group in groups(runs)]
     if lines := [f"- {reason}" for reason in reasons(runs)]:
         parts.append("## What kept a cell from optimal\n\n" + "\n".join(lines))
+    if lines := [f"- {line}" for line in details(runs)]:
+        parts.append("## Inside the solve, means\n\n" + "\n".join(lines))
     parts.append("## Machine\n\n" + "\n".join(_machine_line(n, f) for n, f in machines.items()))
     return "\n\n".join(parts) + "\n"
 

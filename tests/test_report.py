@@ -1,0 +1,139 @@
+"""Tables, chart and page from rows whose every case is known."""
+
+from __future__ import annotations
+
+import json
+from xml.etree import ElementTree
+
+import pandas as pd
+import pytest
+
+from strainbench.records import (
+    MACHINES,
+    RUN_COLUMNS,
+    RUNS,
+    RecordsError,
+    append_rows,
+)
+from strainbench.report import load_runs, write_report
+from strainbench.report.chart import COLOURS, MARKERS, styles
+from strainbench.report.table import accuracy_text, groups, mark, time_text
+
+
+def row(solver, **changes):
+    """A row that is optimal on all of 10 steps, with changes."""
+    base = {
+        **dict.fromkeys(RUN_COLUMNS, ""),
+        **{"schema": 1, "cell": f"{solver}{changes}", "scenario": "swing", "resolution": 10},
+        **{"limit": 0.01, "directions": 4, "integrator": "sap", "solver": solver},
+        **{"tolerance": 1e-6, "mode": "simulate", "steps_asked": 10, "steps_done": 10},
+        **{"outcome": "optimal", "solve_seconds_mean": 0.02, "ie_seconds_mean": 0.005},
+        **{"max_violation": 3e-9, "relative_gap_max": 2e-6, "distance_max": 4e-6},
+        **{"reference_error_max": 3e-5, "projections_violated": 0, "violation_threshold": 1e-6},
+        **{"gap_threshold": 1e-4, "machine": "a machine"},
+    }
+    return base | changes
+
+
+ROWS = [
+    row("none", outcome="violated", projections_violated=8, max_violation=0.4),
+    row("good"),
+    row("good", resolution=20, solve_seconds_mean=0.1, details_mean='{"inner_seconds": 0.01}'),
+    row("loose", outcome="violated", projections_violated=3, reason="3 of 10 projections: ..."),
+    row("slow", outcome="no answer", steps_done=4, reason="time limit of 9 s (4 of 10 steps)"),
+    row("broken", outcome="no answer", steps_done=2, reason="crashed: ... (2 of 10 steps)"),
+    row(
+        "absent",
+        outcome="no answer",
+        steps_done=0,
+        reason="unavailable: needs absent",
+        solve_seconds_mean="",
+        max_violation="",
+        relative_gap_max="",
+        distance_max="",
+        reference_error_max="",
+    ),
+]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, ROWS)
+    facts = {"memory_gb": 8, "system": "Linux", "python": "3.11", "threads_per_solver": 1}
+    (tmp_path / MACHINES).write_text(
+        json.dumps({"a machine": facts | {"packages": {"numpy": "2"}}})
+    )
+    return tmp_path
+
+
+@pytest.fixture
+def by_solver(folder):
+    runs = load_runs(folder)
+    return {r["solver"]: r for _, r in runs[runs["resolution"] == 10].iterrows()}
+
+
+@pytest.mark.parametrize(
+    ("solver", "sign", "text"),
+    [
+        ("good", "", "0.0200"),
+        ("loose", "*", "*0.0200"),
+        ("slow", "*", "*0.0200 (4/10)"),
+        ("broken", "-", "-"),
+        ("absent", "-", "-"),
+    ],
+)
+def test_marks_follow_the_referee(by_solver, solver, sign, text):
+    assert mark(by_solver[solver]) == sign
+    assert time_text(by_solver[solver]) == text
+
+
+def test_accuracy_stands_beside_the_time(by_solver):
+    assert accuracy_text(by_solver["good"]) == "3e-9 · 2e-6 · 0.004"
+    assert accuracy_text(by_solver["absent"]) == ""
+    assert accuracy_text(None) == ""
+
+
+def test_the_table_has_the_papers_shape(folder):
+    (group,) = groups(load_runs(folder))
+    assert group.resolutions == [10, 20]
+    assert group.implicit_euler()[0] == pytest.approx(0.005)
+    assert [solver for _, solver, _ in group.blocks()] == [
+        "good",
+        "loose",
+        "slow",
+        "broken",
+        "absent",
+    ]
+
+
+def test_every_file_is_written_and_every_failure_shown(folder):
+    paths = write_report(folder)
+    assert all(p.stat().st_size > 0 for p in paths)
+    markdown = (folder / "table1.md").read_text()
+    page = (folder / "index.html").read_text()
+    for words in ("time limit of 9 s", "crashed", "unavailable: needs absent", "inner seconds"):
+        assert words in markdown
+        assert words in page
+    table = pd.read_csv(folder / "table1.csv")
+    assert len(table) == len(ROWS)
+    assert "http" not in page.replace("http://www.w3.org", "").replace(
+        "http://purl.org", ""
+    ).replace("http://creativecommons.org", "").replace("https://matplotlib.org", "")
+
+
+def test_the_chart_names_every_solver_failed_ones_too(folder):
+    write_report(folder)
+    text = "".join(ElementTree.parse(folder / "speed-accuracy.svg").getroot().itertext())
+    for name in ("none", "good", "loose", "slow", "broken", "absent", "no answer"):
+        assert name in text
+
+
+def test_a_style_is_a_solvers_own():
+    names = [str(i) for i in range(len(COLOURS) * len(MARKERS) // 4)]
+    found = [tuple(s.values()) for s in styles(names).values()]
+    assert len(set(found)) == len(names)
+
+
+def test_nothing_to_report_is_one_line(tmp_path):
+    with pytest.raises(RecordsError, match="holds no results"):
+        write_report(tmp_path)
