@@ -16,6 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
+from strainbench.discovery import find_solver
 from strainbench.limits import FloatArray
 from strainbench.problem import Problem
 from strainbench.solver import Solver, run_solver
@@ -95,8 +96,6 @@ class ReferenceSolver:
     """
 
     def __init__(self, problem: Problem, cache: Path | None = None) -> None:
-        from strainbench.discovery import find_solver  # plug-ins import this package
-
         self._solver: Solver = find_solver(REFERENCE_SOLVER)
         self._state: Any = None
         self._prepared = False

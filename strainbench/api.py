@@ -1,0 +1,52 @@
+"""One problem, one solver, one call."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+
+import numpy as np
+
+from strainbench.discovery import find_solver
+from strainbench.problem import Problem
+from strainbench.solver import Solution, Solver, Watch, run_solver, warm_up
+
+
+def solve(
+    problem: Problem,
+    solver: str | Solver,
+    tolerance: float = 1e-6,
+    time_limit: float | None = None,
+    watch: Watch | None = None,
+) -> Solution:
+    """Project `problem` with a solver, given by name or as an object.
+
+    Parameters
+    ----------
+    tolerance : the max violation and relative gap to aim for; what is reached, `certify` tells.
+    time_limit : [s], passed on to the solver as its deadline; None is no limit.
+    watch : called off the clock with (seconds, positions, multipliers) of each iterate shown.
+
+    Raises
+    ------
+    ValueError
+        For an unknown or unavailable solver, one that does not support the problem, a tolerance
+        that is not positive, or a negative time limit.
+    """
+    if not tolerance > 0:
+        raise ValueError(f"tolerance is {tolerance}: a number above 0 is valid")
+    if time_limit is not None and not time_limit > 0:
+        raise ValueError(f"time_limit is {time_limit}: a number of seconds above 0 is valid")
+    chosen = find_solver(solver) if isinstance(solver, str) else solver
+    refusal = chosen.supports(problem)
+    if refusal:
+        raise ValueError(f"{chosen.label} cannot take this problem: {refusal}")
+    if reason := problem.infeasible_pins():
+        nothing = np.full_like(problem.target, np.nan)
+        return Solution(nothing, reason, 0, seconds=0.0, setup_seconds=0.0)
+    warm_up(chosen, problem, tolerance)
+    start = perf_counter()
+    state = chosen.prepare(problem)
+    setup_seconds = perf_counter() - start
+    solution = run_solver(chosen, problem, state, tolerance, time_limit, watch)
+    return replace(solution, setup_seconds=setup_seconds)
