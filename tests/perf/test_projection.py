@@ -39,7 +39,7 @@ def test_projection(benchmark, frame, name):
     warm_up(solver, frame, TOLERANCE)
     state = solver.prepare(frame)
     solution = benchmark.pedantic(
-        run_solver, args=(solver, frame, state, TOLERANCE, 10.0), rounds=5, warmup_rounds=1
+        run_solver, args=(solver, frame, state, TOLERANCE, 2.0), rounds=5, warmup_rounds=1
     )
     found = certify(frame, solution.positions)
     benchmark.extra_info.update(
