@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from strainbench.play import read_events, read_frames
 from strainbench.records import SCHEMA
 from strainbench.referee import OUTCOMES, Certificate, certify
 from strainbench.reference import ReferenceSolver
+from strainbench.scenario import StepReport
 
 VIOLATION, GAP = 1e-6, 1e-4
 """The thresholds of every outcome in a results folder; printed with each table."""
@@ -80,7 +82,7 @@ def _step_rows(
     return rows
 
 
-PHYSICS = ("ie_seconds", "newton_iterations", "newton_converged")
+PHYSICS = tuple(f.name for f in fields(StepReport))
 
 
 def _run_row(

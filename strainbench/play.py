@@ -130,7 +130,7 @@ def replay(recording: Path, project: Callable[[FloatArray], FloatArray]) -> Iter
     for _, projections in groupby(zip(events, targets, strict=True), key=lambda p: p[0]["step"]):
         for _, target in projections:
             project(target)
-        yield StepReport(0.0, 0, True)
+        yield StepReport()
 
 
 class _Table:

@@ -77,10 +77,19 @@ STEP_COLUMNS = (
     "distance_bound",
     "reference_error",
     "active_constraints",
+    "details",
+    "time",
     "ie_seconds",
     "newton_iterations",
     "newton_converged",
-    "details",
+    "kinetic_energy",
+    "gravity_energy",
+    "membrane_energy",
+    "bending_energy",
+    "momentum_x",
+    "momentum_y",
+    "momentum_z",
+    "pin_work",
 )
 
 Row = dict[str, str]

@@ -12,18 +12,37 @@ import numpy as np
 
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.physics.cloth import Cloth, Material
-from strainbench.physics.implicit_euler import NewtonSettings, minimise_step
+from strainbench.physics.implicit_euler import (
+    GRAVITY,
+    NewtonReport,
+    NewtonSettings,
+    minimise_step,
+)
 from strainbench.physics.integrators import INTEGRATORS, Motion
 from strainbench.problem import IntArray, Problem
 
 
 @dataclass(frozen=True)
 class StepReport:
-    """What the physics of one time step cost and whether it converged."""
+    """What the physics of one time step cost, whether it converged, and where it left the cloth.
 
-    ie_seconds: float  # in implicit Euler's Newton solver
-    newton_iterations: int
-    newton_converged: bool
+    Energies are in J, with the velocities after the projection; heights count from y = 0. The
+    momentum is in kg m/s. `pin_work` [J] is the work of the forces that hold the pins, as the
+    minimisations of the step find them; it is 0 for pins that do not move.
+    """
+
+    time: float = 0.0  # [s], at the end of the step
+    ie_seconds: float = 0.0  # in implicit Euler's Newton solver
+    newton_iterations: int = 0
+    newton_converged: bool = True
+    kinetic_energy: float = float("nan")
+    gravity_energy: float = float("nan")
+    membrane_energy: float = float("nan")
+    bending_energy: float = float("nan")
+    momentum_x: float = float("nan")
+    momentum_y: float = float("nan")
+    momentum_z: float = float("nan")
+    pin_work: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -85,7 +104,7 @@ class ClothScenario(Scenario):
 
     Parameters
     ----------
-    integrator : "sap" (implicit Euler, then the projection).
+    integrator : a key of `strainbench.physics.integrators.INTEGRATORS`.
     step : time step [s].
     norm : "unweighted" as printed in Eq. 5, or "mass".
     """
@@ -123,29 +142,64 @@ class ClothScenario(Scenario):
         mass = self.cloth().mass if self.norm == "mass" else None
         return Problem(rest, elements, positions, self.limits(), pinned, mass)
 
+    def pin_positions(self, time: float) -> FloatArray | None:  # noqa: ARG002
+        """(p, 3) where the pins are at `time` [m], or None if they never move."""
+        return None
+
     def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
         """Time steps from rest; see the base class."""
         cloth = self.cloth()
         positions = self.sheet()[2]
         motion = Motion(positions, np.zeros_like(positions), 0.0)
         scheme = INTEGRATORS[self.integrator]
-        settings = NewtonSettings()
-        seconds: list[float] = []
-        reports = []
-
-        def minimise(start: FloatArray, inertial: FloatArray, h: float) -> FloatArray:
-            begin = perf_counter()
-            found, report = minimise_step(cloth, start, inertial, h, settings)
-            seconds.append(perf_counter() - begin)
-            reports.append(report)
-            return found
-
         while True:
-            seconds.clear()
-            reports.clear()
-            motion = scheme(motion, self.step, minimise, project)
-            yield StepReport(
-                sum(seconds),
-                sum(r.iterations for r in reports),
-                all(r.converged for r in reports),
-            )
+            step = _Step(self, cloth)
+            motion = scheme(motion, self.step, step.minimise, project)
+            yield step.report(motion)
+
+
+class _Step:
+    """The minimisations of one time step, and what they cost."""
+
+    def __init__(self, scene: ClothScenario, cloth: Cloth) -> None:
+        self.scene, self.cloth = scene, cloth
+        self.settings = NewtonSettings()
+        self.seconds, self.pin_work = 0.0, 0.0
+        self.newton: list[NewtonReport] = []
+
+    def minimise(
+        self, start: FloatArray, inertial: FloatArray, step: float, time: float
+    ) -> FloatArray:
+        """The candidate of a sub-step, with the pins where the scene has them at `time`."""
+        begin = perf_counter()
+        pinned, first = self.cloth.pinned, start.copy()
+        where = self.scene.pin_positions(time)
+        first[pinned] = start[pinned] if where is None else where
+        found, report = minimise_step(self.cloth, first, inertial, step, self.settings)
+        self.seconds += perf_counter() - begin
+        self.newton.append(report)
+        if where is not None:
+            inertia = self.cloth.mass[:, None] * (found - inertial) / step**2
+            force = (self.cloth.energies(found)[-1] + inertia)[pinned]
+            self.pin_work += float(np.sum(force * (found - start)[pinned]))
+        return found
+
+    def report(self, motion: Motion) -> StepReport:
+        """The step's costs, and energy and momentum after it."""
+        mass, v = self.cloth.mass[:, None], motion.velocities
+        membrane, bending, _ = self.cloth.energies(motion.positions)
+        momentum = np.sum(mass * v, axis=0)
+        return StepReport(
+            time=motion.time,
+            ie_seconds=self.seconds,
+            newton_iterations=sum(r.iterations for r in self.newton),
+            newton_converged=all(r.converged for r in self.newton),
+            kinetic_energy=0.5 * float(np.sum(mass * v**2)),
+            gravity_energy=-float(np.sum(mass * motion.positions @ GRAVITY[:, None])),
+            membrane_energy=membrane,
+            bending_energy=bending,
+            momentum_x=float(momentum[0]),
+            momentum_y=float(momentum[1]),
+            momentum_z=float(momentum[2]),
+            pin_work=self.pin_work,
+        )
