@@ -37,9 +37,8 @@ class PluginRef:
     @classmethod
     def of(cls, plugin: Solver | Scenario, path: str | None = None) -> PluginRef:
         """A reference to `plugin`, from the file at `path` unless it is ours."""
-        label = plugin.label if isinstance(plugin, Solver) else plugin.name
         content = _digest(Path(path).read_text()) if path else ""
-        return cls(plugin.name, label, tuple(plugin.parameters.items()), path, content)
+        return cls(plugin.name, plugin.label, tuple(plugin.parameters.items()), path, content)
 
     def solver(self) -> Solver:
         """Load it as a solver."""
@@ -103,9 +102,7 @@ class Cell:
     @property
     def title(self) -> str:
         """For the progress bar."""
-        scenario: dict[str, Any] = dict(self.scenario.parameters)
-        percent = 100 * scenario["limit"]
-        return f"{self.scenario.name} {scenario['resolution']} at {percent:g}%, {self.solver.label}"
+        return f"{self.scenario.label}, {self.solver.label}"
 
 
 def _digest(content: object) -> str:

@@ -93,6 +93,18 @@ class Scenario(ABC):
         """The fields and their values."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
+    @property
+    def label(self) -> str:
+        """Name, resolution and limit, then what else differs from the defaults."""
+        shown = {"resolution", "limit"}
+        changed = {
+            f.name: getattr(self, f.name)
+            for f in fields(self)
+            if f.name not in shown and getattr(self, f.name) != f.default
+        }
+        others = "".join(f", {k}={v}" for k, v in changed.items())
+        return f"{self.name} {self.resolution} at {100 * self.limit:g}%{others}"
+
     def limits(self) -> StretchLimits:
         """The same bound in all directions."""
         return StretchLimits.isotropic(1 + self.limit, self.directions)

@@ -12,11 +12,14 @@ from strainbench.records import (
     MACHINES,
     RUN_COLUMNS,
     RUNS,
+    STEP_COLUMNS,
+    STEPS,
     RecordsError,
     append_rows,
 )
 from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
+from strainbench.report.energy import energies
 from strainbench.report.table import accuracy_text, groups, mark, time_text
 
 
@@ -30,7 +33,7 @@ def row(solver, **changes):
         **{"outcome": "optimal", "solve_seconds_mean": 0.02, "ie_seconds_mean": 0.005},
         **{"max_violation": 3e-9, "relative_gap_max": 2e-6, "distance_max": 4e-6},
         **{"reference_error_max": 3e-5, "projections_violated": 0, "violation_threshold": 1e-6},
-        **{"gap_threshold": 1e-4, "machine": "a machine"},
+        **{"gap_threshold": 1e-4, "machine": "a machine", "scenario_parameters": "{}"},
     }
     return base | changes
 
@@ -126,6 +129,21 @@ def test_the_chart_names_every_solver_failed_ones_too(folder):
     text = "".join(ElementTree.parse(folder / "speed-accuracy.svg").getroot().itertext())
     for name in ("none", "good", "loose", "slow", "broken", "absent", "no answer"):
         assert name in text
+
+
+def test_total_energy_is_drawn_against_time(folder):
+    cells = [r["cell"] for r in ROWS[:2]]
+    steps = [
+        {"cell": c, "step": k, "time": 0.1 * k, "kinetic_energy": 2e-3, "gravity_energy": -k * 1e-3}
+        | {"membrane_energy": 0.0, "bending_energy": 0.0}
+        for c in cells
+        for k in (1, 2, 3)
+    ]
+    append_rows(folder / STEPS, STEP_COLUMNS, steps)
+    table = energies(folder, load_runs(folder))
+    assert table["energy"].tolist() == pytest.approx(2 * [1e-3, 0.0, -1e-3])
+    assert table["curve"].str.startswith("IE").tolist() == 3 * [True] + 3 * [False]
+    assert folder / "energy.png" in write_report(folder)
 
 
 def test_a_style_is_a_solvers_own():

@@ -8,6 +8,7 @@ import pandas as pd
 
 from strainbench.records import RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
+from strainbench.report.energy import draw_energy
 from strainbench.report.page import write_page
 from strainbench.report.table import as_latex, as_markdown, tidy
 
@@ -46,7 +47,7 @@ def load_runs(folder: Path) -> pd.DataFrame:
 
 
 def write_report(folder: Path) -> list[Path]:
-    """Write table1.csv, .md, .tex, speed-accuracy.svg, .png and index.html; return their paths."""
+    """Write table1.csv, .md, .tex, the charts and index.html; return their paths."""
     runs = load_runs(folder)
     machines = read_machines(folder)
     paths = {n: folder / n for n in ("table1.csv", "table1.md", "table1.tex", "index.html")}
@@ -54,6 +55,6 @@ def write_report(folder: Path) -> list[Path]:
     markdown = as_markdown(runs, machines)
     paths["table1.md"].write_text(markdown)
     paths["table1.tex"].write_text(as_latex(runs))
-    charts = speed_accuracy(runs, folder / "speed-accuracy")
+    charts = speed_accuracy(runs, folder / "speed-accuracy") + draw_energy(folder, runs)
     write_page(paths["index.html"], runs, machines, charts)
     return [*paths.values(), *charts]

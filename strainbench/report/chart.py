@@ -60,12 +60,15 @@ def speed_accuracy(runs: pd.DataFrame, stem: Path) -> list[Path]:
         ax.set_xlabel("seconds a projection")
     figure.suptitle(group.title, size=11)
     figure.legend(handles=_legend(style), loc="outside right upper", frameon=False, fontsize=9)
+    return save(figure, stem)
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write `stem`.svg, with text as text, and `stem`.png."""
     paths = [stem.with_suffix(".svg"), stem.with_suffix(".png")]
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "strainbench"}):
-        for path in paths:
-            figure.savefig(
-                path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None
-            )
+        figure.savefig(paths[0], metadata={"Date": None})
+        figure.savefig(paths[1], dpi=150)
     return paths
 
 

@@ -18,16 +18,16 @@ def write_page(
     machines: Mapping[str, Mapping[str, object]],
     charts: Sequence[Path],
 ) -> None:
-    """Write the page; the chart is inlined, nothing is fetched."""
+    """Write the page; the charts are inlined, nothing is fetched."""
     environment = Environment(
         loader=PackageLoader("strainbench.report", "."),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    svg = next(c for c in charts if c.suffix == ".svg").read_text()
+    drawings = [c.read_text() for c in charts if c.suffix == ".svg"]
     page = environment.get_template("page.html").render(
-        chart=Markup(svg[svg.index("<svg") :]),
+        charts=[Markup(svg[svg.index("<svg") :]) for svg in drawings],
         explanation=explanation(runs).replace("`", "").replace("**", ""),
         groups=list(groups(runs)),
         time_text=time_text,
