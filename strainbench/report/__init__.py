@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pandas as pd
@@ -10,6 +11,7 @@ from strainbench.records import RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy
 from strainbench.report.page import write_page
+from strainbench.report.sweep import draw_sweeps, sweep_markdown
 from strainbench.report.table import as_latex, as_markdown, tidy
 
 WORDS = {
@@ -43,7 +45,18 @@ def load_runs(folder: Path) -> pd.DataFrame:
     runs = pd.DataFrame(rows)
     for column in runs.columns.difference(list(WORDS)):
         runs[column] = pd.to_numeric(runs[column])
+    runs["setting"] = [_setting(text) for text in runs["scenario_parameters"]]
     return runs
+
+
+def _setting(parameters: str) -> str:
+    """What sets a scene apart, but for its resolution and limit, which span a table."""
+    values = json.loads(parameters or "{}")
+    return ", ".join(
+        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
+        for key, value in values.items()
+        if key not in ("resolution", "limit")
+    )
 
 
 def write_report(folder: Path) -> list[Path]:
@@ -54,7 +67,11 @@ def write_report(folder: Path) -> list[Path]:
     tidy(runs).to_csv(paths["table1.csv"], index=False)
     markdown = as_markdown(runs, machines)
     paths["table1.md"].write_text(markdown)
+    if swept := sweep_markdown(runs):
+        paths["sweeps.md"] = folder / "sweeps.md"
+        paths["sweeps.md"].write_text("# Sweeps\n\n" + "\n\n".join(swept) + "\n")
     paths["table1.tex"].write_text(as_latex(runs))
     charts = speed_accuracy(runs, folder / "speed-accuracy") + draw_energy(folder, runs)
+    charts += draw_sweeps(folder, runs)
     write_page(paths["index.html"], runs, machines, charts)
     return [*paths.values(), *charts]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-GROUP = ["scenario", "mode", "integrator", "directions", "tolerance", "steps_asked"]
+GROUP = ["scenario", "mode", "setting", "tolerance", "steps_asked"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
 EXPLANATION = """\
 Seconds are means over projections of the time inside the solver, set-up apart, measured by the
@@ -55,11 +55,8 @@ class Group:
 def groups(runs: pd.DataFrame) -> Iterator[Group]:
     """The tables of a results folder."""
     for key, rows in runs.groupby(GROUP, sort=False, dropna=False):
-        scenario, mode, integrator, directions, tolerance, steps = key
-        title = (
-            f"{scenario}, {mode}, {integrator}, {directions} directions, "
-            f"tolerance {tolerance:g}, {steps} steps"
-        )
+        scenario, mode, setting, tolerance, steps = key
+        title = f"{scenario}, {mode}, {setting}, tolerance {tolerance:g}, {steps} steps"
         yield Group(title, rows)
 
 

@@ -1,0 +1,95 @@
+"""Time and accuracy against one setting of a scene (Tang et al. 2022, section 5.1)."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from strainbench.report.chart import FLOOR_MM, save, styles
+from strainbench.report.table import UNCONSTRAINED, accuracy_text, time_text
+
+FEWEST = 3  # values of a setting that make a sweep
+
+
+def sweeps(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
+    """For each number of a scene that takes at least three values, the rows by its value."""
+    parameters = [json.loads(text or "{}") for text in runs["scenario_parameters"]]
+    found = {}
+    for key in dict.fromkeys(k for p in parameters for k in p):
+        values = [p.get(key) for p in parameters]
+        numbers = {v for v in values if isinstance(v, int | float)}
+        if len(numbers) >= FEWEST:
+            rows = runs.assign(value=pd.to_numeric(pd.Series(values, runs.index), errors="coerce"))
+            rest = [{k: v for k, v in p.items() if k != key} for p in parameters]
+            rows["rest"] = [json.dumps(r, sort_keys=True) for r in rest]
+            rows = rows[(rows["solver"] != UNCONSTRAINED) & rows["value"].notna()]
+            found[key] = rows.sort_values("value", kind="stable")
+    return found
+
+
+def sweep_markdown(runs: pd.DataFrame) -> list[str]:
+    """A table for each sweep: rows are values, columns solvers."""
+    parts = []
+    for key, rows in sweeps(runs).items():
+        for (_, mode), group in rows.groupby(["rest", "mode"], sort=False):
+            if group["value"].nunique() < FEWEST:
+                continue
+            first = group.iloc[0]
+            others = {k: v for k, v in json.loads(first["rest"]).items()}
+            about = ", ".join(f"{k} {v}" for k, v in others.items())
+            solvers = list(dict.fromkeys(group["solver"]))
+            header = [key, *(t for s in solvers for t in (f"{s} [s]", "violation · gap · mm"))]
+            lines = [header, ["---"] * len(header)]
+            for value, at in group.groupby("value"):
+                by_solver = {r["solver"]: r for _, r in at.iterrows()}
+                texts = [
+                    t
+                    for s in solvers
+                    for t in (time_text(by_solver.get(s)), accuracy_text(by_solver.get(s)))
+                ]
+                lines.append([f"{value:g}", *texts])
+            table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
+            parts.append(f"## {first['scenario']} against {key} ({mode}, {about})\n\n{table}")
+    return parts
+
+
+def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:
+    """sweep-<setting>.svg and .png: seconds and distance against each swept setting."""
+    paths = []
+    for key, rows in sweeps(runs).items():
+        figure = Figure(figsize=(9.5, 3.6), layout="constrained")
+        axes = figure.subplots(1, 2)
+        style = styles(list(dict.fromkeys(rows["solver"])))
+        several = rows["rest"].nunique() > 1
+        for (solver, rest), line in rows.groupby(["solver", "rest"], sort=False):
+            label = solver if not several else f"{solver}, {_differs(rest, rows)}"
+            answered = line[line["outcome"] != "no answer"]
+            look = {**style[solver], "markersize": 5, "linewidth": 1.2}
+            if several:
+                look.pop("color")
+            axes[0].plot(answered["value"], answered["solve_seconds_mean"], label=label, **look)
+            millimetres = (1000 * answered["distance_max"]).clip(lower=FLOOR_MM)
+            axes[1].plot(answered["value"], millimetres, **look)
+        for ax, name in zip(
+            axes, ("seconds a projection", "distance to optimum [mm]"), strict=True
+        ):
+            ax.set_yscale("log")
+            if rows["value"].min() > 0 and rows["value"].max() > 8 * rows["value"].min():
+                ax.set_xscale("log")
+            ax.set_xlabel(key)
+            ax.set_ylabel(name)
+            ax.grid(visible=True, color="#dddddd", linewidth=0.6)
+        figure.legend(loc="outside right upper", frameon=False, fontsize=8)
+        paths += save(figure, folder / f"sweep-{key}")
+    return paths
+
+
+def _differs(rest: str, rows: pd.DataFrame) -> str:
+    """What sets one line's other settings apart from the other lines'."""
+    everything = [json.loads(r) for r in rows["rest"].unique()]
+    mine = json.loads(rest)
+    keys = [k for k in mine if len({json.dumps(e.get(k)) for e in everything}) > 1]
+    return ", ".join(f"{k} {mine[k]}" for k in keys)
