@@ -20,6 +20,7 @@ from strainbench.records import (
 from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
 from strainbench.report.energy import energies
+from strainbench.report.sweep import sweeps
 from strainbench.report.table import accuracy_text, groups, mark, time_text
 
 
@@ -144,6 +145,31 @@ def test_total_energy_is_drawn_against_time(folder):
     assert table["energy"].tolist() == pytest.approx(2 * [1e-3, 0.0, -1e-3])
     assert table["curve"].str.startswith("IE").tolist() == 3 * [True] + 3 * [False]
     assert folder / "energy.png" in write_report(folder)
+
+
+def test_three_values_of_a_setting_make_a_sweep(tmp_path):
+    swept = [
+        row(s, limit=v, scenario_parameters=json.dumps({"limit": v, "resolution": 10}))
+        for v in (0.01, 0.001, 0.1)
+        for s in ("good", "none")
+    ]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, swept)
+    runs = load_runs(tmp_path)
+    assert list(sweeps(runs)) == ["limit"]
+    assert sweeps(runs)["limit"]["value"].tolist() == [0.001, 0.01, 0.1]
+    assert tmp_path / "sweep-limit.png" in write_report(tmp_path)
+    lines = (tmp_path / "sweeps.md").read_text().splitlines()
+    assert [line.split(" | ")[0] for line in lines if line.startswith("| 0")] == [
+        "| 0.001",
+        "| 0.01",
+        "| 0.1",
+    ]
+
+
+def test_scenes_with_other_settings_have_tables_of_their_own(tmp_path):
+    steps = [row("good", scenario_parameters=json.dumps({"step": h})) for h in (0.01, 0.02)]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, steps)
+    assert len(list(groups(load_runs(tmp_path)))) == 2
 
 
 def test_a_style_is_a_solvers_own():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pandas as pd
@@ -12,7 +11,7 @@ from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy
 from strainbench.report.page import write_page
 from strainbench.report.sweep import draw_sweeps, sweep_markdown
-from strainbench.report.table import as_latex, as_markdown, tidy
+from strainbench.report.table import as_latex, as_markdown, describe, tidy
 
 WORDS = {
     *(
@@ -45,18 +44,9 @@ def load_runs(folder: Path) -> pd.DataFrame:
     runs = pd.DataFrame(rows)
     for column in runs.columns.difference(list(WORDS)):
         runs[column] = pd.to_numeric(runs[column])
-    runs["setting"] = [_setting(text) for text in runs["scenario_parameters"]]
+    spanned = ("resolution", "limit")  # within a table
+    runs["setting"] = [describe(text, spanned) for text in runs["scenario_parameters"]]
     return runs
-
-
-def _setting(parameters: str) -> str:
-    """What sets a scene apart, but for its resolution and limit, which span a table."""
-    values = json.loads(parameters or "{}")
-    return ", ".join(
-        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
-        for key, value in values.items()
-        if key not in ("resolution", "limit")
-    )
 
 
 def write_report(folder: Path) -> list[Path]:

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from strainbench.report.chart import FLOOR_MM, save, styles
-from strainbench.report.table import UNCONSTRAINED, accuracy_text, time_text
+from strainbench.report.table import UNCONSTRAINED, accuracy_text, describe, time_text
 
 FEWEST = 3  # values of a setting that make a sweep
 
@@ -38,8 +38,7 @@ def sweep_markdown(runs: pd.DataFrame) -> list[str]:
             if group["value"].nunique() < FEWEST:
                 continue
             first = group.iloc[0]
-            others = {k: v for k, v in json.loads(first["rest"]).items()}
-            about = ", ".join(f"{k} {v}" for k, v in others.items())
+            about = describe(first["rest"])
             solvers = list(dict.fromkeys(group["solver"]))
             header = [key, *(t for s in solvers for t in (f"{s} [s]", "violation · gap · mm"))]
             lines = [header, ["---"] * len(header)]

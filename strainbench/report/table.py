@@ -52,6 +52,15 @@ class Group:
         return [float(means.get(n, float("nan"))) for n in self.resolutions]
 
 
+def describe(parameters: str, without: tuple[str, ...] = ()) -> str:
+    """Settings from their JSON, on a line."""
+    return ", ".join(
+        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
+        for key, value in json.loads(parameters or "{}").items()
+        if key not in without
+    )
+
+
 def groups(runs: pd.DataFrame) -> Iterator[Group]:
     """The tables of a results folder."""
     for key, rows in runs.groupby(GROUP, sort=False, dropna=False):
