@@ -78,6 +78,9 @@ def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:
             ax.set_yscale("log")
             if rows["value"].min() > 0 and rows["value"].max() > 8 * rows["value"].min():
                 ax.set_xscale("log")
+            values = sorted(rows["value"].unique())
+            ax.set_xticks(values, [f"{v:.3g}" for v in values], size=8)
+            ax.minorticks_off()
             ax.set_xlabel(key)
             ax.set_ylabel(name)
             ax.grid(visible=True, color="#dddddd", linewidth=0.6)
