@@ -121,6 +121,8 @@ def _run_row(
         "newton_failures": sum(not e["newton_converged"] for e in steps),
         "variables": loaded.get("variables", ""),
         "constraints": loaded.get("constraints", ""),
+        "nonzeros": loaded.get("nonzeros", ""),
+        "needs": loaded.get("needs", ""),
         "active_constraints_max": max((c.active_constraints for c in certificates), default=""),
         "peak_memory_mb": by_name.get("ended", {}).get("peak_memory_mb", ""),
         "blas_threads": loaded.get("blas_threads", ""),

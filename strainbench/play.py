@@ -99,6 +99,8 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
         "loaded",
         variables=3 * len(problem.free),
         constraints=problem.rows,
+        nonzeros=3 * problem.G.nnz,
+        needs=", ".join(sorted(scenario.needs)),
         blas_threads=threads,
     )
     if refusal := solver.supports(problem):

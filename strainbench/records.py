@@ -47,6 +47,8 @@ RUN_COLUMNS = (
     "newton_failures",
     "variables",
     "constraints",
+    "nonzeros",
+    "needs",
     "active_constraints_max",
     "peak_memory_mb",
     "blas_threads",

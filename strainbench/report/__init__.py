@@ -24,6 +24,7 @@ WORDS = {
         "outcome",
         "reason",
         "details_mean",
+        "needs",
     ),
     *("scenario_parameters", "solver_parameters", "machine"),
 }

@@ -9,7 +9,15 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
-from strainbench.report.table import accuracy_text, details, explanation, groups, reasons, time_text
+from strainbench.report.table import (
+    accuracy_text,
+    details,
+    explanation,
+    groups,
+    ledger,
+    reasons,
+    time_text,
+)
 
 
 def write_page(
@@ -34,6 +42,7 @@ def write_page(
         accuracy_text=accuracy_text,
         reasons=reasons(runs),
         details=details(runs),
+        ledger=ledger(runs).itertuples(index=False),
         machines=machines,
     )
     path.write_text(page)

@@ -150,6 +150,22 @@ def details(runs: pd.DataFrame) -> list[str]:
     ]
 
 
+def ledger(runs: pd.DataFrame) -> pd.DataFrame:
+    """What each scene models: physics, unknowns, constraints, most active ones, non-zeros."""
+    sizes = ["variables", "constraints", "active_constraints_max", "nonzeros"]
+    keys = ["scenario", "needs", "resolution", "directions"]
+    return runs.dropna(subset=["variables"]).groupby(keys, sort=False)[sizes].max().reset_index()
+
+
+def _ledger_markdown(runs: pd.DataFrame) -> str:
+    names = ["scene", "physics it needs", "cells", "directions", "variables", "constraints"]
+    header = [*names, "active at most", "non-zeros"]
+    lines = [_line(header), _line(["---"] * len(header))]
+    for values in ledger(runs).itertuples(index=False):
+        lines.append(_line([f"{v:.0f}" if isinstance(v, float) else str(v) for v in values]))
+    return "## Model ledger\n\n" + "\n".join(lines)
+
+
 def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
     """All tables, what their signs mean, the reasons of every failure, the machine."""
     parts = ["# Table 1: seconds a projection, and the accuracy reached", explanation(runs)]
@@ -158,6 +174,7 @@ def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
         parts.append("## What kept a cell from optimal\n\n" + "\n".join(lines))
     if lines := [f"- {line}" for line in details(runs)]:
         parts.append("## Inside the solve, means\n\n" + "\n".join(lines))
+    parts.append(_ledger_markdown(runs))
     parts.append("## Machine\n\n" + "\n".join(_machine_line(n, f) for n, f in machines.items()))
     return "\n\n".join(parts) + "\n"
 
