@@ -1,4 +1,4 @@
-"""The command line: list, run, report."""
+"""The command line: list, run, report, render, polar."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ app = typer.Typer(
 )
 console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
+DEFAULT_PICTURES = Path("results/local/pictures")
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
@@ -134,6 +135,97 @@ def report(
 
     for path in write_report(results):
         console.print(f"wrote {path}", highlight=False)
+
+
+@app.command()
+def render(
+    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    solver: Annotated[str, typer.Option(help="name, or path of a .py file")] = "clarabel",
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="time steps")] = 30,
+    every: Annotated[int, typer.Option(help="keep each K-th step")] = 1,
+    format_: Annotated[
+        str, typer.Option("--format", help="of png, gif, mp4, obj, ply, vtu, with commas")
+    ] = "png,gif",
+    camera: Annotated[str, typer.Option(help="azimuth,elevation of the view, degrees")] = "30,32",
+    scale: Annotated[
+        str | None, typer.Option(help="strain at the colour scale's end, such as 5%; else fitted")
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="aimed at by the solver")] = 1e-6,
+    output: Annotated[Path, typer.Option("-o", "--output", help="folder")] = DEFAULT_PICTURES,
+) -> None:
+    """Play a scene with one solver; write pictures, animations and mesh series."""
+    from strainbench import render as pictures  # matplotlib and meshio only where needed
+
+    top = None if scale is None else pictures.parse_scale(scale)
+    view = pictures.parse_camera(camera)
+    with _bar() as bar:
+        lines = pictures.render(
+            scenario,
+            solver,
+            set_ or [],
+            steps,
+            every,
+            format_,
+            output,
+            view,
+            top,
+            tolerance,
+            lambda items, what, total: bar.track(items, total, description=what),
+        )
+    for line in lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+@app.command()
+def polar(
+    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    solver: Annotated[
+        str, typer.Option(help="name, comma-separated names, or a path")
+    ] = "clarabel",
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
+    ] = None,
+    steps: Annotated[int, typer.Option(help="time steps; the last one is drawn")] = 30,
+    tolerance: Annotated[float, typer.Option(help="aimed at by every solver")] = 1e-6,
+    output: Annotated[Path, typer.Option("-o", "--output", help="an .svg, .png or .pdf file")] = (
+        DEFAULT_PICTURES / "polar.svg"
+    ),
+) -> None:
+    """Draw the limits over the material angle, and the strains a scene ends with."""
+    from strainbench.render.polar import polar as draw  # matplotlib only where needed
+
+    with _bar() as bar:
+        lines = draw(
+            scenario,
+            solver,
+            set_ or [],
+            steps,
+            output,
+            tolerance,
+            lambda items, what, total: bar.track(items, total, description=what),
+        )
+    for line in lines:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+def _bar() -> Progress:
+    """A progress bar with what is done and the time it takes."""
+    return Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("gone,"),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+        console=console,
+    )
 
 
 class Display(Observer):

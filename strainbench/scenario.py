@@ -109,6 +109,16 @@ class Scenario(ABC):
         """The same bound in all directions."""
         return StretchLimits.isotropic(1 + self.limit, self.directions)
 
+    def curve(self) -> tuple[FloatArray, FloatArray] | None:
+        """Angles (a,) [rad] and bounds (a,) of the curve that `limits` samples, for polar plots.
+
+        None where a scene has limits of its own and does not say.
+        """
+        if type(self).limits is not Scenario.limits:
+            return None
+        angles = np.linspace(-np.pi / 2, np.pi / 2, 180, endpoint=False)
+        return angles, np.full(len(angles), 1 + self.limit)
+
 
 @dataclass(frozen=True)
 class ClothScenario(Scenario):

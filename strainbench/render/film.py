@@ -1,0 +1,161 @@
+"""A scene played in process, closed loop, with one solver: the states that pictures show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strainbench.cell import Cell
+from strainbench.limits import FloatArray
+from strainbench.plan import plan
+from strainbench.problem import Problem
+from strainbench.solver import Solver, run_solver
+
+Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
+"""(items, what they are, how many) to the same items, with a progress bar beside them."""
+
+
+def untracked(items: Iterable[Any], what: str, total: int) -> Iterable[Any]:  # noqa: ARG001
+    """The items, with nothing shown."""
+    return items
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The positions (n, 3) [m] after a step, at a time [s], None where a scene has no clock."""
+
+    step: int
+    time: float | None
+    positions: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Film:
+    """Frames of one scene and solver.
+
+    Parameters
+    ----------
+    scene, solver : what the titles say
+    interval : time between frames [s], or None
+    stopped : why the last frames are missing, or ""
+    """
+
+    scene: str
+    solver: str
+    problem: Problem
+    frames: list[Frame]
+    interval: float | None
+    stopped: str = ""
+
+    @cached_property
+    def strains(self) -> list[FloatArray]:
+        """(e,) largest principal strain of each element, for each frame."""
+        return [principal_stretches(self.problem, f.positions)[:, 0] - 1 for f in self.frames]
+
+
+def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
+    """(e, dim) singular values of each deformation gradient, the largest first."""
+    F = problem.deformation_gradients(positions)
+    return np.asarray(np.linalg.svd(F, compute_uv=False), dtype=np.float64)
+
+
+def cells_to_draw(
+    scenario: str, solvers: str, settings: Iterable[str], steps: int, tolerance: float
+) -> list[Cell]:
+    """One scene with one set of values, and its solvers, from the words of a command line.
+
+    Raises
+    ------
+    ValueError
+        One line: a wrong word, several scenes where one is drawn, or an unavailable solver.
+    """
+    cells = plan([scenario], [solvers], list(settings), "simulate", steps, [tolerance], None)
+    scenes = {str(cell.scenario.identity) for cell in cells}
+    if len(scenes) > 1:
+        raise ValueError(
+            f"--set and {scenario} give {len(scenes)} scenes: one is drawn at a time, "
+            "so one value a setting is valid"
+        )
+    for cell in cells:
+        if cell.solver.unavailable:
+            raise ValueError(cell.solver.unavailable)
+    return cells
+
+
+def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
+    """Play a cell and keep the start, every `every`-th step and the last one.
+
+    A solver that fails ends the film early and is named in `stopped`.
+
+    Raises
+    ------
+    ValueError
+        If the solver does not take the scene's problem, or `every` is below 1.
+    """
+    if every < 1:
+        raise ValueError(f"--every {every}: a whole number above 0 is valid")
+    scenario, solver = cell.scenario.scenario(), cell.solver.solver()
+    problem = scenario.problem()
+    if refusal := solver.supports(problem):
+        raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
+    step: float | None = getattr(scenario, "step", None)  # a scene without inertia has no clock
+    stage = _Stage(problem, solver, cell.tolerance)
+    frames = [Frame(0, None if step is None else 0.0, problem.target)]
+    stopped = ""
+    steps = scenario.play(stage.project)
+    for k in track(range(1, cell.steps + 1), f"playing {cell.title}", cell.steps):
+        try:
+            next(steps)
+        except Exception as error:  # a failing solver is data here too: what was played is shown
+            reason = str(error) if isinstance(error, _Cut) else f"{type(error).__name__}: {error}"
+            stopped = f"{solver.label} ended in step {k} of {cell.steps}: {reason}"
+            break
+        if k % every == 0 or k == cell.steps:
+            frames.append(Frame(k, None if step is None else k * step, stage.positions))
+    parameters: dict[str, Any] = dict(cell.scenario.parameters)
+    scene = f"{scenario.name}, {parameters['resolution']}×{parameters['resolution']} cells"
+    interval = None if step is None else every * step
+    return Film(scene, solver.label, problem, frames, interval, stopped)
+
+
+class _Cut(Exception):  # noqa: N818
+    """Ends a film early, with the reason."""
+
+
+class _Stage:
+    """Where candidates meet the solver; the last answer of a step is the step's state."""
+
+    def __init__(self, problem: Problem, solver: Solver, tolerance: float) -> None:
+        self._problem, self._solver, self._tolerance = problem, solver, tolerance
+        self._state = solver.prepare(problem)
+        self.positions = problem.target
+
+    def project(self, target: FloatArray) -> FloatArray:
+        """Limit one candidate."""
+        if not np.all(np.isfinite(target)):
+            raise _Cut("the simulation has left the finite numbers")
+        problem = self._problem.with_target(target)
+        solution = run_solver(self._solver, problem, self._state, self._tolerance)
+        positions = np.asarray(solution.positions)
+        if positions.shape != target.shape or not np.all(np.isfinite(positions)):
+            raise _Cut(f"no usable positions; it says {str(solution.status)!r}")
+        self.positions = positions
+        return positions
+
+
+def writable_folder(folder: Path) -> None:
+    """Make sure that `folder` exists and can be written to; ValueError in one line if not."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe = folder / ".writable"
+        probe.write_text("")
+        probe.unlink()
+    except OSError as error:
+        raise ValueError(
+            f"-o {folder} cannot be written to ({error.strerror}): a folder of yours is valid"
+        ) from None
