@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -164,7 +165,9 @@ def append_rows(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, 
 
 
 def _plain(value: object) -> object:
-    """Text on one line, of sane length, that UTF-8 can hold; other values as they are."""
+    """Text on one line, of sane length, that UTF-8 can hold; nothing for NaN."""
+    if isinstance(value, float) and math.isnan(value):
+        return ""
     if not isinstance(value, str):
         return value
     return " ".join(value.encode(errors="replace").decode().split())[:LONGEST_TEXT]
