@@ -9,7 +9,14 @@ from strainbench.mesh import square_grid
 from strainbench.physics.bending import add_bending_gradient, angle_and_gradient, hinges
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
-from strainbench.physics.membrane import add_membrane_gradient, eigenpairs, membrane_hessian
+from strainbench.physics.linear import symmetric
+from strainbench.physics.membrane import (
+    add_membrane_gradient,
+    add_membrane_hessian,
+    eigenpairs,
+    singular_frames,
+)
+from strainbench.physics.pattern import Pattern
 from strainbench.problem import shape_gradients
 from tests.problems import central_difference, random_mesh, rotation
 
@@ -47,9 +54,22 @@ def membrane(x, elements, gradients, weights):
 
 
 def triangle_hessian(x, gradients, weight, clamp):
-    H = np.empty((9, 9))
-    membrane_hessian(x, TRIANGLE[0], gradients[0], weight, LAM, MU, clamp, H)
-    return H
+    """(9, 9), through the assembly."""
+    pattern = Pattern.of([TRIANGLE], 3, NO_PINS)
+    data = np.zeros(len(pattern.indices))
+    weights = np.array([weight])
+    where = (pattern.slots[0], pattern.stride, data)
+    add_membrane_hessian(x, TRIANGLE, gradients, weights, LAM, MU, clamp, *where)
+    return symmetric(pattern.matrix(data)).toarray()
+
+
+def eigen_decomposition(F):
+    """Eigenvalues (6,) and eigenmatrices as rows (6, 6)."""
+    U, s, V = np.empty((3, 3)), np.empty(2), np.empty((2, 2))
+    values, Q = np.empty(6), np.empty((6, 3, 2))
+    singular_frames(np.ascontiguousarray(F), U, s, V)
+    eigenpairs(U, s, V, LAM, MU, values, Q)
+    return values, Q.reshape(6, 6)
 
 
 # --- membrane
@@ -112,8 +132,7 @@ def test_unclamped_membrane_hessian_is_the_derivative_of_the_gradient(rng, s):
 
 @pytest.mark.parametrize("s", SINGULAR_VALUES)
 def test_eigenmatrices_are_orthonormal(rng, s):
-    _, Q = eigenpairs(np.ascontiguousarray(with_singular_values(rng, s)), LAM, MU)
-    Q = Q.reshape(6, 6)
+    _, Q = eigen_decomposition(with_singular_values(rng, s))
     np.testing.assert_allclose(Q @ Q.T, np.eye(6), atol=1e-8)
 
 
@@ -138,9 +157,7 @@ def test_clamping_changes_nothing_under_tension(rng, s):
 
 @pytest.mark.parametrize("s", [(0.6, 0.3), (1.3, 0.4), (0.9, 0.9), (1.1, 0.0)])
 def test_clamping_removes_just_the_negative_curvature(rng, s):
-    F = np.ascontiguousarray(with_singular_values(rng, s))
-    values, Q = eigenpairs(F, LAM, MU)
-    Q = Q.reshape(6, 6)
+    values, Q = eigen_decomposition(with_singular_values(rng, s))
     assert values.min() < 0
     H = Q.T * values @ Q
     w, V = np.linalg.eigh(H)
