@@ -80,7 +80,14 @@ def _step_rows(
     return rows
 
 
-PHYSICS = ("ie_seconds", "newton_iterations", "newton_converged")
+PHYSICS = (
+    "ie_seconds",
+    "newton_iterations",
+    "newton_converged",
+    "assembly_seconds",
+    "factorisation_seconds",
+    "line_search_seconds",
+)
 
 
 def _run_row(

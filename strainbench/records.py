@@ -80,6 +80,9 @@ STEP_COLUMNS = (
     "ie_seconds",
     "newton_iterations",
     "newton_converged",
+    "assembly_seconds",
+    "factorisation_seconds",
+    "line_search_seconds",
     "details",
 )
 

@@ -88,8 +88,11 @@ class Cloth:
         """For systems in the Hessian; analysed once."""
         return best_linear_solver(self.pattern.matrix())
 
-    def hessian_values(self, x: FloatArray, diagonal: FloatArray) -> FloatArray:
-        """Positive semidefinite Hessian plus a (n,) `diagonal` [N/m], as values of the pattern."""
+    def hessian_values(self, x: FloatArray, diagonal: FloatArray, clamp: bool = True) -> FloatArray:
+        """Hessian plus a (n,) `diagonal` [N/m], as values of the pattern.
+
+        Positive semidefinite if `clamp`; that of bending always is.
+        """
         lam, mu = self.material.lame
         pattern = self.pattern
         data = np.zeros(len(pattern.indices))
@@ -98,11 +101,11 @@ class Cloth:
         triangles, quads = pattern.slots
         gradients, stride = self._shape[0], pattern.stride
         add_membrane_hessian(
-            x, self.elements, gradients, weights, lam, mu, True, triangles, stride, data
+            x, self.elements, gradients, weights, lam, mu, clamp, triangles, stride, data
         )
         add_bending_hessian(x, *self._hinges, quads, stride, data)
         return data
 
     def hessian(self, x: FloatArray, diagonal: FloatArray) -> sp.csc_array:
-        """The same as a whole symmetric matrix on the free vertices."""
+        """The clamped one, as a whole symmetric matrix on the free vertices."""
         return symmetric(self.pattern.matrix(self.hessian_values(x, diagonal)))

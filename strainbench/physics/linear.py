@@ -5,8 +5,9 @@ Ordering and symbolic analysis happen once, in the constructor; `factorise` is n
 CHOLMOD (Chen et al. 2008, supernodal Cholesky), from the optional GPL package cvxopt, takes a
 quarter of the time of SuperLU, which is always there: 17 ms to 62 ms on the swing at 60 x 60.
 SuperLU redoes its symbolic part each time; with the permutation of its first run kept, it is
-spared the search for one, a seventh of its time. Its `relax` and `panel_size` stay as they are:
-larger ones gain nothing and write past its work arrays (scipy 1.17).
+spared the search for one, a seventh of its time, half of which goes into reading its pivots. Its
+`relax` and `panel_size` stay as they are: larger ones gain nothing and write past its work arrays
+(scipy 1.17).
 """
 
 from __future__ import annotations
@@ -78,12 +79,16 @@ class SuperLU(LinearSolver):
         self._matrix = permuted
 
     def factorise(self, data: FloatArray) -> None:
-        """See the base class; an indefinite matrix is factorised all the same."""
+        """See the base class."""
         np.take(data, self._entries, out=self._matrix.data)
         try:
             self._factor = _lu(self._matrix, "NATURAL")
         except RuntimeError as error:
             raise NotPositiveDefiniteError(str(error)) from None
+        pivots = self._factor.U.diagonal()  # those of L D L^T, as none is exchanged
+        if not np.all(pivots > 0):
+            column = int(np.argmin(pivots > 0))
+            raise NotPositiveDefiniteError(f"no Cholesky factor: column {column}")
 
     def solve(self, b: FloatArray) -> FloatArray:
         """See the base class."""
@@ -113,7 +118,10 @@ class Cholmod(LinearSolver):
 
     def factorise(self, data: FloatArray) -> None:
         """See the base class."""
-        self._matrix.V = self._cvxopt.matrix(data[self._below])
+        lower = data[self._below]
+        if not np.all(np.isfinite(lower)):  # CHOLMOD itself does not notice
+            raise NotPositiveDefiniteError("a value is not finite")
+        self._matrix.V = self._cvxopt.matrix(lower)
         try:
             self._cholmod.numeric(self._matrix, self._factor)
         except ArithmeticError as error:
@@ -126,9 +134,11 @@ class Cholmod(LinearSolver):
         return np.array(x).ravel()
 
 
-LINEAR_SOLVERS: dict[str, type[LinearSolver]] = {"cholmod": Cholmod, "superlu": SuperLU}
+def available_linear_solvers() -> list[type[LinearSolver]]:
+    """Those whose packages are installed, the fastest first."""
+    return [Cholmod, SuperLU] if find_spec("cvxopt") else [SuperLU]
 
 
 def best_linear_solver(pattern: sp.csc_array) -> LinearSolver:
     """CHOLMOD where cvxopt is installed, SuperLU otherwise."""
-    return (Cholmod if find_spec("cvxopt") else SuperLU)(pattern)
+    return available_linear_solvers()[0](pattern)
