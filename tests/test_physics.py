@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from time import perf_counter
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,14 @@ from strainbench.mesh import square_grid
 from strainbench.physics.bending import add_bending_gradient, angle_and_gradient, hinges
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
-from strainbench.physics.membrane import add_membrane_gradient, eigenpairs, membrane_hessian
+from strainbench.physics.linear import NotPositiveDefiniteError, SuperLU, symmetric
+from strainbench.physics.membrane import (
+    add_membrane_gradient,
+    add_membrane_hessian,
+    eigenpairs,
+    singular_frames,
+)
+from strainbench.physics.pattern import Pattern
 from strainbench.problem import shape_gradients
 from tests.problems import central_difference, random_mesh, rotation
 
@@ -17,7 +26,7 @@ LAM, MU = Material().lame
 SEEDS = range(6)
 NO_PINS = np.array([], dtype=np.int64)
 TRIANGLE = np.array([[0, 1, 2]])
-SHARP = NewtonSettings(tolerance=1e-7)  # rounding of the energy stops Armijo near 1e-8
+SHARP = NewtonSettings(tolerance=1e-7)
 
 
 def small_cloth(rng, pinned=NO_PINS, **material):
@@ -47,9 +56,22 @@ def membrane(x, elements, gradients, weights):
 
 
 def triangle_hessian(x, gradients, weight, clamp):
-    H = np.empty((9, 9))
-    membrane_hessian(x, TRIANGLE[0], gradients[0], weight, LAM, MU, clamp, H)
-    return H
+    """(9, 9), through the assembly."""
+    pattern = Pattern.of([TRIANGLE], 3, NO_PINS)
+    data = np.zeros(len(pattern.indices))
+    weights = np.array([weight])
+    where = (pattern.slots[0], pattern.stride, data)
+    add_membrane_hessian(x, TRIANGLE, gradients, weights, LAM, MU, clamp, *where)
+    return symmetric(pattern.matrix(data)).toarray()
+
+
+def eigen_decomposition(F):
+    """Eigenvalues (6,) and eigenmatrices as rows (6, 6)."""
+    U, s, V = np.empty((3, 3)), np.empty(2), np.empty((2, 2))
+    values, Q = np.empty(6), np.empty((6, 3, 2))
+    singular_frames(np.ascontiguousarray(F), U, s, V)
+    eigenpairs(U, s, V, LAM, MU, values, Q)
+    return values, Q.reshape(6, 6)
 
 
 # --- membrane
@@ -112,8 +134,7 @@ def test_unclamped_membrane_hessian_is_the_derivative_of_the_gradient(rng, s):
 
 @pytest.mark.parametrize("s", SINGULAR_VALUES)
 def test_eigenmatrices_are_orthonormal(rng, s):
-    _, Q = eigenpairs(np.ascontiguousarray(with_singular_values(rng, s)), LAM, MU)
-    Q = Q.reshape(6, 6)
+    _, Q = eigen_decomposition(with_singular_values(rng, s))
     np.testing.assert_allclose(Q @ Q.T, np.eye(6), atol=1e-8)
 
 
@@ -138,9 +159,7 @@ def test_clamping_changes_nothing_under_tension(rng, s):
 
 @pytest.mark.parametrize("s", [(0.6, 0.3), (1.3, 0.4), (0.9, 0.9), (1.1, 0.0)])
 def test_clamping_removes_just_the_negative_curvature(rng, s):
-    F = np.ascontiguousarray(with_singular_values(rng, s))
-    values, Q = eigenpairs(F, LAM, MU)
-    Q = Q.reshape(6, 6)
+    values, Q = eigen_decomposition(with_singular_values(rng, s))
     assert values.min() < 0
     H = Q.T * values @ Q
     w, V = np.linalg.eigh(H)
@@ -366,6 +385,7 @@ def test_too_few_iterations_are_not_convergence(rng):
     x = lifted(0.7 * cloth.rest) + 0.1 * np.ptp(cloth.rest) * rng.normal(size=(len(cloth.rest), 3))
     _, report = step(cloth, x, np.zeros(3), 0.1, NewtonSettings(max_iterations=1))
     assert not report.converged
+    assert report.reason == "1 iterations"
     assert report.iterations == 1
     assert report.residual > 1e-6
 
@@ -375,6 +395,7 @@ def test_a_failed_line_search_is_not_convergence(rng):
     x = lifted(0.7 * cloth.rest)
     found, report = step(cloth, x, np.zeros(3), 0.1, NewtonSettings(max_halvings=0))
     assert not report.converged
+    assert "line search" in report.reason
     np.testing.assert_array_equal(found, x)
 
 
@@ -383,6 +404,79 @@ def test_the_last_allowed_iteration_may_converge(rng):
     x = lifted(cloth.rest)
     _, report = step(cloth, x, np.zeros(3), 0.01, NewtonSettings(max_iterations=1))
     assert report.converged, "one Newton step solves free fall"
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-10])
+def test_newton_converges_where_the_fall_of_the_energy_drowns_in_rounding(tolerance):
+    rest, elements = square_grid(10, 0.5, "alternating")
+    cloth = Cloth(rest, elements, Material(), np.array([0, 110]))
+    x, v, h = lifted(rest, np.array([[1, 0], [0, 0], [0, 1]])), 0.0, 1 / 60
+    for _ in range(10):
+        new, report = step(cloth, x, v, h, NewtonSettings(tolerance))
+        assert report.converged, report
+        assert report.residual <= tolerance
+        x, v = new, (new - x) / h
+
+
+def test_no_acceptable_step_along_a_direction_that_does_not_descend(rng):
+    """A linear solver that lies is found out."""
+
+    class Liar(SuperLU):
+        def solve(self, b):
+            return -super().solve(b)
+
+    cloth = small_cloth(rng, np.array([0]))
+    x = lifted(0.7 * cloth.rest)
+    liar = Liar(cloth.pattern.matrix())
+    found, report = minimise_step(cloth, x, x + 0.01 * GRAVITY, 0.1, SHARP, liar)
+    assert "line search" in report.reason
+    np.testing.assert_array_equal(found, x)
+
+
+def test_a_matrix_that_cannot_be_factorised_is_not_convergence(rng):
+    class Refusing(SuperLU):
+        def factorise(self, data):
+            raise NotPositiveDefiniteError("refused")
+
+    cloth = small_cloth(rng, np.array([0]))
+    x = lifted(0.7 * cloth.rest)
+    refusing = Refusing(cloth.pattern.matrix())
+    found, report = minimise_step(cloth, x, x + 0.01 * GRAVITY, 0.1, SHARP, refusing)
+    assert (report.converged, report.reason, report.factorisations) == (False, "refused", 2)
+    np.testing.assert_array_equal(found, x)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e200])
+def test_a_start_that_is_not_finite_is_not_convergence(rng, bad):
+    cloth = small_cloth(rng, np.array([0]))
+    x = lifted(cloth.rest)
+    x[3, 1] = bad
+    with np.errstate(all="ignore"):
+        _, report = step(cloth, x, np.zeros(3), 0.1)
+    assert not report.converged
+    assert "not finite" in report.reason
+
+
+def test_a_compressed_sheet_needs_the_clamped_hessian(rng):
+    """Its own is indefinite: it wants to buckle."""
+    cloth = small_cloth(rng, np.array([0]))
+    x = lifted(0.5 * cloth.rest) + 1e-3 * rng.normal(size=(len(cloth.rest), 3))
+    found, report = step(cloth, x, np.zeros(3), 0.5)
+    assert report.converged
+    assert report.factorisations > report.iterations
+    before, after = (sum(cloth.energies(p)[:2]) for p in (x, found))
+    assert after < before
+
+
+def test_the_parts_of_a_step_add_up(rng):
+    cloth = small_cloth(rng, np.array([0]))
+    begin = perf_counter()
+    _, report = step(cloth, lifted(1.1 * cloth.rest), np.zeros(3), 0.01)
+    seconds = perf_counter() - begin
+    parts = (report.assembly_seconds, report.factorisation_seconds, report.line_search_seconds)
+    assert min(parts) > 0
+    assert sum(parts) <= seconds
+    assert report.evaluations > report.iterations
 
 
 def test_implicit_euler_converges_with_order_one():

@@ -100,7 +100,12 @@ def test_step_rows_are_read_back(tmp_path):
     assert read_rows(path, STEP_COLUMNS) == [as_text(row) for row in rows]
 
 
-@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-300, 123456789.123456789, float("nan")])
+def test_nan_is_an_empty_field(tmp_path):
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, [run_row(max_violation=float("nan"))])
+    assert read_rows(tmp_path / RUNS, RUN_COLUMNS)[0]["max_violation"] == ""
+
+
+@pytest.mark.parametrize("value", [0.1 + 0.2, 1e-300, 123456789.123456789])
 def test_numbers_keep_all_their_digits(tmp_path, value):
     append_rows(tmp_path / RUNS, RUN_COLUMNS, [run_row(max_violation=value)])
     (row,) = read_rows(tmp_path / RUNS, RUN_COLUMNS)

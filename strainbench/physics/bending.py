@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from strainbench.limits import FloatArray
+from strainbench.physics.pattern import scatter
 from strainbench.problem import IntArray
 
 
@@ -42,22 +43,33 @@ def hinges(rest: FloatArray, elements: IntArray, areas: FloatArray) -> tuple[Int
 
 @njit(cache=True)
 def angle_and_gradient(x: FloatArray, hinge: IntArray, grad: FloatArray) -> float:
-    """Hinge angle [rad]; its gradient (4, 3) [rad/m] is written to `grad`."""
-    x0 = x[hinge[0]]
-    e, a, b = x[hinge[1]] - x0, x[hinge[2]] - x0, x[hinge[3]] - x0
-    n1, n2 = np.cross(e, a), np.cross(b, e)
-    length2, m1, m2 = e @ e, n1 @ n1, n2 @ n2
-    length = np.sqrt(length2)
+    """Hinge angle [rad]; its gradient (4, 3) [rad/m] is written to `grad`.
+
+    With n1 = e x a and n2 = b x e: theta's gradient is -|e| n1/|n1|^2 at x2, -|e| n2/|n2|^2 at
+    x3, and minus their shares t2 = a.e/|e|^2, t3 = b.e/|e|^2 at x1, the rest at x0.
+    """
+    i0, i1, i2, i3 = hinge[0], hinge[1], hinge[2], hinge[3]
+    e0, e1, e2 = x[i1, 0] - x[i0, 0], x[i1, 1] - x[i0, 1], x[i1, 2] - x[i0, 2]
+    a0, a1, a2 = x[i2, 0] - x[i0, 0], x[i2, 1] - x[i0, 1], x[i2, 2] - x[i0, 2]
+    b0, b1, b2 = x[i3, 0] - x[i0, 0], x[i3, 1] - x[i0, 1], x[i3, 2] - x[i0, 2]
+    n1 = (e1 * a2 - e2 * a1, e2 * a0 - e0 * a2, e0 * a1 - e1 * a0)  # e x a
+    n2 = (b1 * e2 - b2 * e1, b2 * e0 - b0 * e2, b0 * e1 - b1 * e0)  # b x e
+    length2 = e0 * e0 + e1 * e1 + e2 * e2
+    m1 = n1[0] * n1[0] + n1[1] * n1[1] + n1[2] * n1[2]
+    m2 = n2[0] * n2[0] + n2[1] * n2[1] + n2[2] * n2[2]
     if m1 <= 1e-24 * length2**2 or m2 <= 1e-24 * length2**2:  # a collapsed triangle has no angle
         grad[:] = 0.0
         return 0.0
-    t2, t3 = (a @ e) / length2, (b @ e) / length2
+    length = np.sqrt(length2)
+    t2 = (a0 * e0 + a1 * e1 + a2 * e2) / length2
+    t3 = (b0 * e0 + b1 * e1 + b2 * e2) / length2
     for c in range(3):
-        g2, g3 = -length * n1[c] / m1, -length * n2[c] / m2
+        g2, g3 = -length / m1 * n1[c], -length / m2 * n2[c]
         grad[2, c], grad[3, c] = g2, g3
         grad[1, c] = -t2 * g2 - t3 * g3
         grad[0, c] = -(1 - t2) * g2 - (1 - t3) * g3
-    return float(np.arctan2(np.cross(n1, n2) @ e / length, n1 @ n2))
+    sine = -length * (n1[0] * b0 + n1[1] * b1 + n1[2] * b2)  # (n1 x n2).e/|e| = -|e| n1.b
+    return float(np.arctan2(sine, n1[0] * n2[0] + n1[1] * n2[1] + n1[2] * n2[2]))
 
 
 @njit(cache=True)
@@ -74,3 +86,22 @@ def add_bending_gradient(
             for c in range(3):
                 out[quads[h, k], c] += 2 * weights[h] * theta * grad[k, c]
     return energy
+
+
+@njit(cache=True)
+def add_bending_hessian(
+    x: FloatArray,
+    quads: IntArray,
+    weights: FloatArray,
+    slots: IntArray,
+    stride: IntArray,
+    data: FloatArray,
+) -> None:
+    """Add every hinge's 2 c grad(theta) grad(theta)^T [N/m] to a sparse matrix."""
+    grad = np.empty((4, 3))
+    mode = grad.reshape(1, 12)
+    value = np.empty(1)
+    for h in range(len(quads)):
+        angle_and_gradient(x, quads[h], grad)
+        value[0] = 2 * weights[h]
+        scatter(value, mode, quads[h], slots[h], stride, data)

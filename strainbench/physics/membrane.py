@@ -16,30 +16,29 @@ import numpy as np
 from numba import njit
 
 from strainbench.limits import FloatArray
+from strainbench.physics.pattern import scatter
 from strainbench.problem import IntArray
 
 
 @njit(cache=True)
-def deformation_gradient(x: FloatArray, triangle: IntArray, B: FloatArray) -> FloatArray:
-    """F (3, 2) of one triangle: sum_k x_k B_k."""
-    F = np.zeros((3, 2))
+def deformation_gradient(x: FloatArray, triangle: IntArray, B: FloatArray, F: FloatArray) -> None:
+    """Write F (3, 2) of one triangle: sum_k x_k B_k."""
+    F[:] = 0.0
     for k in range(3):
         for a in range(3):
             F[a, 0] += x[triangle[k], a] * B[k, 0]
             F[a, 1] += x[triangle[k], a] * B[k, 1]
-    return F
 
 
 @njit(cache=True)
-def singular_frames(F: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def singular_frames(F: FloatArray, U: FloatArray, s: FloatArray, V: FloatArray) -> None:
     """Thin SVD of a 3 x 2 matrix: U (3, 3) with the normal as third column, s (2,), V (2, 2)."""
     c00 = F[0, 0] ** 2 + F[1, 0] ** 2 + F[2, 0] ** 2
     c11 = F[0, 1] ** 2 + F[1, 1] ** 2 + F[2, 1] ** 2
     c01 = F[0, 0] * F[0, 1] + F[1, 0] * F[1, 1] + F[2, 0] * F[2, 1]
     angle = 0.5 * np.arctan2(2 * c01, c00 - c11)
-    V = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    U = np.zeros((3, 3))
-    s = np.zeros(2)
+    V[0, 0], V[0, 1] = np.cos(angle), -np.sin(angle)
+    V[1, 0], V[1, 1] = -V[0, 1], V[0, 0]
     for i in range(2):
         for a in range(3):
             U[a, i] = F[a, 0] * V[0, i] + F[a, 1] * V[1, i]
@@ -54,8 +53,9 @@ def singular_frames(F: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
             length = np.sqrt(1.0 - along**2)
         for a in range(3):
             U[a, i] /= length
-    U[:, 2] = np.cross(U[:, 0], U[:, 1])
-    return U, s, V
+    for a in range(3):  # u1 x u2
+        b, c = (a + 1) % 3, (a + 2) % 3
+        U[a, 2] = U[b, 0] * U[c, 1] - U[c, 0] * U[b, 1]
 
 
 @njit(cache=True)
@@ -70,9 +70,10 @@ def add_membrane_gradient(
 ) -> float:
     """Add the gradient (n, 3) [N] to `out`; return the energy [J]. `weights` are [m^3]."""
     energy = 0.0
+    F = np.empty((3, 2))
     for e in range(len(triangles)):
         B = gradients[e]
-        F = deformation_gradient(x, triangles[e], B)
+        deformation_gradient(x, triangles[e], B, F)
         e00 = 0.5 * (F[0, 0] ** 2 + F[1, 0] ** 2 + F[2, 0] ** 2 - 1)
         e11 = 0.5 * (F[0, 1] ** 2 + F[1, 1] ** 2 + F[2, 1] ** 2 - 1)
         e01 = 0.5 * (F[0, 0] * F[0, 1] + F[1, 0] * F[1, 1] + F[2, 0] * F[2, 1])
@@ -88,25 +89,33 @@ def add_membrane_gradient(
 
 
 @njit(cache=True)
-def eigenpairs(F: FloatArray, lam: float, mu: float) -> tuple[FloatArray, FloatArray]:
-    """Eigenvalues (6,) [Pa] and eigenmatrices (6, 3, 2) of the energy density's Hessian in F."""
-    U, s, V = singular_frames(F)
-    E = 0.5 * (s**2 - 1)
-    S = lam * (E[0] + E[1]) + 2 * mu * E
-    values = np.zeros(6)
-    Q = np.zeros((6, 3, 2))
-    w00 = S[0] + s[0] ** 2 * (lam + 2 * mu)
-    w11 = S[1] + s[1] ** 2 * (lam + 2 * mu)
+def eigenpairs(
+    U: FloatArray,
+    s: FloatArray,
+    V: FloatArray,
+    lam: float,
+    mu: float,
+    values: FloatArray,
+    Q: FloatArray,
+) -> None:
+    """Write eigenvalues (6,) [Pa], eigenmatrices (6, 3, 2) of the energy density's Hessian in F.
+
+    `U`, `s`, `V` are those of `singular_frames`.
+    """
+    E0, E1 = 0.5 * (s[0] ** 2 - 1), 0.5 * (s[1] ** 2 - 1)
+    trace = lam * (E0 + E1)
+    S0, S1 = trace + 2 * mu * E0, trace + 2 * mu * E1
+    w00 = S0 + s[0] ** 2 * (lam + 2 * mu)
+    w11 = S1 + s[1] ** 2 * (lam + 2 * mu)
     w01 = lam * s[0] * s[1]
     mean, half = 0.5 * (w00 + w11), 0.5 * (w00 - w11)
     radius = np.sqrt(half**2 + w01**2)
     angle = 0.5 * np.arctan2(w01, half)
     cosine, sine = np.cos(angle), np.sin(angle)
     values[0], values[1] = mean + radius, mean - radius
-    trace = lam * (E[0] + E[1])
     values[2] = trace + mu * (s[0] ** 2 + s[0] * s[1] + s[1] ** 2 - 1)
     values[3] = trace + mu * (s[0] ** 2 - s[0] * s[1] + s[1] ** 2 - 1)
-    values[4], values[5] = S[0], S[1]
+    values[4], values[5] = S0, S1
     root = np.sqrt(0.5)
     for a in range(3):
         for b in range(2):
@@ -118,31 +127,37 @@ def eigenpairs(F: FloatArray, lam: float, mu: float) -> tuple[FloatArray, FloatA
             Q[3, a, b] = root * (cross - back)
             Q[4, a, b] = U[a, 2] * V[b, 0]
             Q[5, a, b] = U[a, 2] * V[b, 1]
-    return values, Q
 
 
 @njit(cache=True)
-def membrane_hessian(
+def add_membrane_hessian(
     x: FloatArray,
-    triangle: IntArray,
-    B: FloatArray,
-    weight: float,
+    triangles: IntArray,
+    gradients: FloatArray,
+    weights: FloatArray,
     lam: float,
     mu: float,
     clamp: bool,
-    out: FloatArray,
+    slots: IntArray,
+    stride: IntArray,
+    data: FloatArray,
 ) -> None:
-    """Write one triangle's Hessian (9, 9) [N/m] to `out`, positive semidefinite if `clamp`."""
-    values, Q = eigenpairs(deformation_gradient(x, triangle, B), lam, mu)
-    out[:] = 0.0
-    q = np.zeros(9)
-    for m in range(6):
-        if clamp and values[m] <= 0.0:
-            continue
-        for k in range(3):
-            for a in range(3):
-                q[3 * k + a] = Q[m, a, 0] * B[k, 0] + Q[m, a, 1] * B[k, 1]
-        for i in range(9):
-            scaled = weight * values[m] * q[i]
-            for j in range(9):
-                out[i, j] += scaled * q[j]
+    """Add every triangle's Hessian [N/m], positive semidefinite if `clamp`, to a sparse matrix.
+
+    In x it is sum_m w value_m q_m q_m^T, with q_m = Q_m B_k at vertex k.
+    """
+    F, U, s, V = np.empty((3, 2)), np.empty((3, 3)), np.empty(2), np.empty((2, 2))
+    values, Q, modes = np.empty(6), np.empty((6, 3, 2)), np.empty((6, 9))
+    for e in range(len(triangles)):
+        B = gradients[e]
+        deformation_gradient(x, triangles[e], B, F)
+        singular_frames(F, U, s, V)
+        eigenpairs(U, s, V, lam, mu, values, Q)
+        for m in range(6):
+            values[m] *= weights[e]
+            if clamp and values[m] <= 0.0:
+                values[m] = 0.0
+            for k in range(3):
+                for a in range(3):
+                    modes[m, 3 * k + a] = Q[m, a, 0] * B[k, 0] + Q[m, a, 1] * B[k, 1]
+        scatter(values, modes, triangles[e], slots[e], stride, data)
