@@ -11,6 +11,7 @@ from numba import njit
 
 from strainbench.limits import FloatArray
 from strainbench.physics.bending import add_bending_gradient, angle_and_gradient, hinges
+from strainbench.physics.contact import Contact, add_blocks
 from strainbench.physics.membrane import add_membrane_gradient, membrane_hessian
 from strainbench.problem import IntArray, shape_gradients
 
@@ -23,7 +24,7 @@ class Material:
     density: float = 200.0  # [kg/m^3]
     young: float = 1800.0  # [Pa]
     poisson: float = 0.41
-    bending: float = 1e-6  # hinge stiffness [J]; the paper gives none
+    bending: float = 1e-6  # hinge stiffness [J]; the paper gives none. 0 builds no hinges
 
     @property
     def lame(self) -> tuple[float, float]:
@@ -42,12 +43,14 @@ class Cloth:
     elements : (e, 3)
     material : Material
     pinned : (p,) vertices that are not unknowns of a step
+    contact : what the vertices are kept off, or None
     """
 
     rest: FloatArray
     elements: IntArray
     material: Material
     pinned: IntArray
+    contact: Contact | None = None
 
     @cached_property
     def _shape(self) -> tuple[FloatArray, FloatArray]:
@@ -63,6 +66,8 @@ class Cloth:
 
     @cached_property
     def _hinges(self) -> tuple[IntArray, FloatArray]:
+        if self.material.bending == 0:
+            return np.empty((0, 4), dtype=np.int64), np.empty(0)
         quads, weights = hinges(self.rest, self.elements, self._shape[1])
         return quads, self.material.bending * weights
 
@@ -76,6 +81,12 @@ class Cloth:
         )
         bending = add_bending_gradient(x, *self._hinges, gradient)
         return membrane, bending, gradient
+
+    def add_contact_gradient(self, x: FloatArray, out: FloatArray) -> float:
+        """Add the gradient (n, 3) [N] of contact to `out`; return its energy [J]."""
+        if self.contact is None:
+            return 0.0
+        return self.contact.add_gradient(x, self.contact.stiffnesses(self.mass), out)
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -94,6 +105,9 @@ class Cloth:
             x, self.elements, self._shape[0], weights, lam, mu, triangles, pattern.stride, data
         )
         _assemble_bending(x, *self._hinges, quads, pattern.stride, data)
+        if self.contact is not None:
+            blocks = self.contact.hessian_blocks(x, self.contact.stiffnesses(self.mass))
+            add_blocks(blocks, pattern.free, pattern.diagonal, pattern.stride, data)
         return sp.csc_array((data, pattern.indices, pattern.indptr), shape=2 * (pattern.size,))
 
 
@@ -135,6 +149,9 @@ class Pattern:
         slots = []
         for family in families:
             k = family.shape[1]
+            if len(family) == 0:  # such as no hinges
+                slots.append(np.empty((0, k, k), dtype=np.int64))
+                continue
             i = number[np.repeat(family, k, axis=1)].ravel()
             j = number[np.tile(family, (1, k))].ravel()
             inside = (i >= 0) & (j >= 0)

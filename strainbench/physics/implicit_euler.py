@@ -68,9 +68,10 @@ def minimise_step(
 
     def energy(x: FloatArray) -> tuple[float, FloatArray]:
         membrane, bending, gradient = cloth.energies(x)
+        contact = cloth.add_contact_gradient(x, gradient)
         difference = x - inertial
         kinetic = 0.5 * float(np.sum(inertia[:, None] * difference**2))
-        return kinetic + membrane + bending, gradient + inertia[:, None] * difference
+        return kinetic + membrane + bending + contact, gradient + inertia[:, None] * difference
 
     value, gradient = energy(x)
     residual = float(np.linalg.norm(gradient[free])) / scale
