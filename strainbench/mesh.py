@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from strainbench.limits import FloatArray
-from strainbench.problem import IntArray
+from strainbench.problem import IntArray, shape_gradients
 
 
 def square_grid(resolution: int, side: float, diagonals: str) -> tuple[FloatArray, IntArray]:
@@ -32,3 +32,10 @@ def square_grid(resolution: int, side: float, diagonals: str) -> tuple[FloatArra
     turn = (i + j) % 2 == 1 if diagonals == "alternating" else np.zeros(len(i), dtype=bool)
     elements = np.where(turn[:, None], falling, rising).reshape(-1, 3)
     return rest, elements
+
+
+def lumped_areas(rest: FloatArray, elements: IntArray) -> FloatArray:
+    """(n,) [m^2]: a third of each triangle's rest area (e, 3) at each of its vertices."""
+    areas = np.zeros(len(rest))
+    np.add.at(areas, elements, shape_gradients(rest, elements)[1][:, None] / 3)
+    return areas

@@ -96,6 +96,8 @@ STEP_COLUMNS = (
     "momentum_y",
     "momentum_z",
     "pin_work",
+    "contact_energy",
+    "penetration",
 )
 
 Row = dict[str, str]

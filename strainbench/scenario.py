@@ -11,7 +11,9 @@ from typing import ClassVar
 import numpy as np
 
 from strainbench.limits import FloatArray, StretchLimits
+from strainbench.mesh import lumped_areas
 from strainbench.physics.cloth import Cloth, Material
+from strainbench.physics.contact import Contact
 from strainbench.physics.implicit_euler import (
     GRAVITY,
     NewtonReport,
@@ -28,7 +30,8 @@ class StepReport:
 
     Energies are in J, with the velocities after the projection; heights count from y = 0. The
     momentum is in kg m/s. `pin_work` [J] is the work of the forces that hold the pins, as the
-    minimisations of the step find them; it is 0 for pins that do not move.
+    minimisations of the step find them; it is 0 for pins that do not move. `penetration` [m] is
+    the depth of the deepest vertex inside an obstacle, after the projection.
     """
 
     time: float = 0.0  # [s], at the end of the step
@@ -46,6 +49,8 @@ class StepReport:
     momentum_y: float = float("nan")
     momentum_z: float = float("nan")
     pin_work: float = 0.0
+    contact_energy: float = 0.0
+    penetration: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -124,8 +129,42 @@ class Scenario(ABC):
 
 
 @dataclass(frozen=True)
-class ClothScenario(Scenario):
+class SheetScenario(Scenario):
+    """A sheet of triangles, without physics of its own.
+
+    Parameters
+    ----------
+    norm : "mass", or "unweighted" as printed in Eq. 5. Without a material the masses are those
+        of a sheet of 1 kg/m^2: a factor common to all changes no projection.
+    """
+
+    norm: str = "mass"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.norm not in ("unweighted", "mass"):
+            raise ValueError(f"norm is {self.norm!r}: valid are unweighted, mass")
+
+    @abstractmethod
+    def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
+        """Rest positions (n, 2), triangles (e, 3), initial positions (n, 3), pins (p,)."""
+
+    def mass(self) -> FloatArray:
+        """(n,) [kg], lumped at the vertices."""
+        return lumped_areas(*self.sheet()[:2])
+
+    def problem(self) -> Problem:
+        """The projection, with the sheet's initial positions as its target."""
+        rest, elements, positions, pinned = self.sheet()
+        mass = self.mass() if self.norm == "mass" else None
+        return Problem(rest, elements, positions, self.limits(), pinned, mass)
+
+
+@dataclass(frozen=True)
+class ClothScenario(SheetScenario):
     """A sheet of cloth that moves under gravity, stepped by one of the paper's schemes.
+
+    Bending is built where "bending" is in `needs`.
 
     Parameters
     ----------
@@ -134,9 +173,9 @@ class ClothScenario(Scenario):
     norm : "unweighted" as printed in Eq. 5, or "mass".
     """
 
+    norm: str = "unweighted"
     integrator: str = "sap"
     step: float = 1 / 60
-    norm: str = "unweighted"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -145,27 +184,39 @@ class ClothScenario(Scenario):
             raise ValueError(f"integrator is {self.integrator!r}: valid are {valid}")
         if not 0 < self.step < float("inf"):
             raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
-        if self.norm not in ("unweighted", "mass"):
-            raise ValueError(f"norm is {self.norm!r}: valid are unweighted, mass")
-
-    @abstractmethod
-    def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
-        """Rest positions (n, 2), triangles (e, 3), initial positions (n, 3), pins (p,)."""
 
     def material(self) -> Material:
-        """The constants of Tang et al. 2022, section 5."""
-        return Material()
+        """The constants of Tang et al. 2022, section 5; no bending where it is not needed."""
+        return Material() if "bending" in self.needs else Material(bending=0.0)
+
+    def contact(self) -> Contact | None:
+        """What the sheet is kept off, or None."""
+        return None
+
+    def force(
+        self,
+        positions: FloatArray,  # noqa: ARG002
+        velocities: FloatArray,  # noqa: ARG002
+        time: float,  # noqa: ARG002
+    ) -> FloatArray | None:
+        """(n, 3) explicit forces [N] besides gravity, or None if there are none.
+
+        Parameters
+        ----------
+        positions : (n, 3) [m], at the start of the sub-step.
+        velocities : (n, 3) [m/s], at the start of the step.
+        time : [s], at the end of the sub-step.
+        """
+        return None
 
     def cloth(self) -> Cloth:
         """The sheet's masses and energies."""
         rest, elements, _, pinned = self.sheet()
-        return Cloth(rest, elements, self.material(), pinned)
+        return Cloth(rest, elements, self.material(), pinned, self.contact())
 
-    def problem(self) -> Problem:
-        """The projection, with the sheet's initial positions as its target."""
-        rest, elements, positions, pinned = self.sheet()
-        mass = self.cloth().mass if self.norm == "mass" else None
-        return Problem(rest, elements, positions, self.limits(), pinned, mass)
+    def mass(self) -> FloatArray:
+        """(n,) [kg], lumped at the vertices."""
+        return self.cloth().mass
 
     def pin_positions(self, time: float) -> FloatArray | None:  # noqa: ARG002
         """(p, 3) where the pins are at `time` [m], or None if they never move."""
@@ -179,7 +230,7 @@ class ClothScenario(Scenario):
         scheme = INTEGRATORS[self.integrator]
         _ = cloth.linear_solver  # sparsity and ordering, once a mesh: part of no step
         while True:
-            step = _Step(self, cloth)
+            step = _Step(self, cloth, motion.velocities)
             motion = scheme(motion, self.step, step.minimise, project)
             yield step.report(motion)
 
@@ -187,8 +238,8 @@ class ClothScenario(Scenario):
 class _Step:
     """The minimisations of one time step, and what they cost."""
 
-    def __init__(self, scene: ClothScenario, cloth: Cloth) -> None:
-        self.scene, self.cloth = scene, cloth
+    def __init__(self, scene: ClothScenario, cloth: Cloth, velocities: FloatArray) -> None:
+        self.scene, self.cloth, self.velocities = scene, cloth, velocities
         self.settings = NewtonSettings()
         self.seconds, self.pin_work = 0.0, 0.0
         self.newton: list[NewtonReport] = []
@@ -201,19 +252,25 @@ class _Step:
         pinned, first = self.cloth.pinned, start.copy()
         where = self.scene.pin_positions(time)
         first[pinned] = start[pinned] if where is None else where
+        push = self.scene.force(start, self.velocities, time)
+        if push is not None:
+            inertial = inertial + step**2 * push / self.cloth.mass[:, None]
         found, report = minimise_step(self.cloth, first, inertial, step, self.settings)
         self.seconds += perf_counter() - begin
         self.newton.append(report)
         if where is not None:
             inertia = self.cloth.mass[:, None] * (found - inertial) / step**2
-            force = (self.cloth.energies(found)[-1] + inertia)[pinned]
+            gradient = self.cloth.energies(found)[-1]
+            self.cloth.add_contact_gradient(found, gradient)
+            force = (gradient + inertia)[pinned]
             self.pin_work += float(np.sum(force * (found - start)[pinned]))
         return found
 
     def report(self, motion: Motion) -> StepReport:
         """The step's costs, and energy and momentum after it."""
         mass, v = self.cloth.mass[:, None], motion.velocities
-        membrane, bending, _ = self.cloth.energies(motion.positions)
+        membrane, bending, gradient = self.cloth.energies(motion.positions)
+        contact = self.cloth.contact
         momentum = np.sum(mass * v, axis=0)
         return StepReport(
             time=motion.time,
@@ -231,4 +288,6 @@ class _Step:
             momentum_y=float(momentum[1]),
             momentum_z=float(momentum[2]),
             pin_work=self.pin_work,
+            contact_energy=self.cloth.add_contact_gradient(motion.positions, gradient),
+            penetration=contact.penetration(motion.positions) if contact else 0.0,
         )

@@ -147,6 +147,16 @@ def test_total_energy_is_drawn_against_time(folder):
     assert folder / "energy.png" in write_report(folder)
 
 
+def test_a_scene_without_physics_has_no_energy_and_contact_counts(folder):
+    cells = [r["cell"] for r in ROWS[:2]]
+    steps = [
+        {"cell": cells[0], "step": 1, "time": 0.0, "kinetic_energy": "nan"},
+        {"cell": cells[1], "step": 1, "time": 0.1, "kinetic_energy": 2e-3, "contact_energy": 1e-3},
+    ]
+    append_rows(folder / STEPS, STEP_COLUMNS, steps)
+    assert energies(folder, load_runs(folder))["energy"].tolist() == pytest.approx([3e-3])
+
+
 def test_three_values_of_a_setting_make_a_sweep(tmp_path):
     swept = [
         row(s, limit=v, scenario_parameters=json.dumps({"limit": v, "resolution": 10}))

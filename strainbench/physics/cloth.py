@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from strainbench.limits import FloatArray
 from strainbench.physics.bending import add_bending_gradient, add_bending_hessian, hinges
+from strainbench.physics.contact import Contact, add_blocks
 from strainbench.physics.linear import LinearSolver, best_linear_solver, symmetric
 from strainbench.physics.membrane import add_membrane_gradient, add_membrane_hessian
 from strainbench.physics.pattern import Pattern
@@ -24,7 +25,7 @@ class Material:
     density: float = 200.0  # [kg/m^3]
     young: float = 1800.0  # [Pa]
     poisson: float = 0.41
-    bending: float = 1e-6  # hinge stiffness [J]; the paper gives none
+    bending: float = 1e-6  # hinge stiffness [J]; the paper gives none. 0 builds no hinges
 
     @property
     def lame(self) -> tuple[float, float]:
@@ -43,12 +44,14 @@ class Cloth:
     elements : (e, 3)
     material : Material
     pinned : (p,) vertices that are not unknowns of a step
+    contact : what the vertices are kept off, or None
     """
 
     rest: FloatArray
     elements: IntArray
     material: Material
     pinned: IntArray
+    contact: Contact | None = None
 
     @cached_property
     def _shape(self) -> tuple[FloatArray, FloatArray]:
@@ -64,6 +67,8 @@ class Cloth:
 
     @cached_property
     def _hinges(self) -> tuple[IntArray, FloatArray]:
+        if self.material.bending == 0:
+            return np.empty((0, 4), dtype=np.int64), np.empty(0)
         quads, weights = hinges(self.rest, self.elements, self._shape[1])
         return quads, self.material.bending * weights
 
@@ -77,6 +82,12 @@ class Cloth:
         )
         bending = add_bending_gradient(x, *self._hinges, gradient)
         return membrane, bending, gradient
+
+    def add_contact_gradient(self, x: FloatArray, out: FloatArray) -> float:
+        """Add the gradient (n, 3) [N] of contact to `out`; return its energy [J]."""
+        if self.contact is None:
+            return 0.0
+        return self.contact.add_gradient(x, self.contact.stiffnesses(self.mass), out)
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -104,6 +115,9 @@ class Cloth:
             x, self.elements, gradients, weights, lam, mu, clamp, triangles, stride, data
         )
         add_bending_hessian(x, *self._hinges, quads, stride, data)
+        if self.contact is not None:
+            blocks = self.contact.hessian_blocks(x, self.contact.stiffnesses(self.mass))
+            add_blocks(blocks, pattern.free, pattern.diagonal, stride, data)
         return data
 
     def hessian(self, x: FloatArray, diagonal: FloatArray) -> sp.csc_array:

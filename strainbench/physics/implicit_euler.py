@@ -82,10 +82,11 @@ class _Function:
         """phi [J] and its gradient at the free vertices (f, 3) [N]."""
         self.evaluations += 1
         membrane, bending, gradient = self.cloth.energies(x)
+        contact = self.cloth.add_contact_gradient(x, gradient)
         difference = x - self.inertial
         force = self.inertia[:, None] * difference
         kinetic = 0.5 * float(np.vdot(force, difference))
-        return kinetic + membrane + bending, (gradient + force)[self.cloth.pattern.free]
+        return kinetic + membrane + bending + contact, (gradient + force)[self.cloth.pattern.free]
 
 
 def minimise_step(

@@ -54,6 +54,9 @@ class Pattern:
         slots = []
         for family in families:
             k = family.shape[1]
+            if len(family) == 0:  # such as no hinges
+                slots.append(np.empty((0, k, k), dtype=np.int64))
+                continue
             i = number[np.repeat(family, k, axis=1)].ravel()
             j = number[np.tile(family, (1, k))].ravel()
             inside = (i >= j) & (j >= 0)

@@ -12,7 +12,13 @@ from strainbench.records import STEP_COLUMNS, STEPS, read_rows
 from strainbench.report.chart import COLOURS, save
 from strainbench.report.table import UNCONSTRAINED
 
-PARTS = ["kinetic_energy", "gravity_energy", "membrane_energy", "bending_energy"]
+PARTS = [
+    "kinetic_energy",
+    "gravity_energy",
+    "membrane_energy",
+    "bending_energy",
+    "contact_energy",
+]
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 LOW = 2.0  # the axis shows energies down to this many times the lowest of the runs that lose energy
 
@@ -25,8 +31,10 @@ def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """
     steps = pd.DataFrame(read_rows(folder / STEPS, STEP_COLUMNS), columns=list(STEP_COLUMNS))
     for column in ("step", "time", *PARTS):
-        steps[column] = pd.to_numeric(steps[column])
-    steps = steps.dropna(subset=["time"]).drop_duplicates(["cell", "step"], keep="last")
+        steps[column] = pd.to_numeric(steps[column].replace("nan", ""))
+    steps = steps.dropna(subset=["time", "kinetic_energy"]).drop_duplicates(
+        ["cell", "step"], keep="last"
+    )
     names = {row["cell"]: _names(row) for _, row in runs.iterrows() if row["mode"] == "simulate"}
     order = {cell: k for k, cell in enumerate(names)}
     steps = steps[steps["cell"].isin(names)]

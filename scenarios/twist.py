@@ -1,0 +1,91 @@
+"""A sheet whose clamped ends turn against each other, past what it can follow (nobody)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from strainbench.limits import FloatArray
+from strainbench.mesh import square_grid
+from strainbench.problem import IntArray, longest_edges
+from strainbench.scenario import SheetScenario, StepReport
+
+SIDE = 0.5  # [m]
+
+
+@dataclass(frozen=True)
+class Twist(SheetScenario):
+    """A sheet whose clamped ends turn against each other, past what it can follow (nobody).
+
+    A square of side L lies in the horizontal plane, two opposite ends pinned; each turns by half
+    the angle theta about the sheet's long axis, in opposite senses. No time stepping is needed:
+    in each step the pins turn, the rest of the candidate stays where the last projection left it.
+
+    The scene is infeasible by design. The ends of an edge line at the distance y from the axis
+    lie on two circles of radius y, L apart, so they are sqrt(L^2 + (2 y sin(theta/2))^2) from each
+    other. The line y = L/2 has the farthest ends; its edges grow to L_max = (1 + limit) L together
+    where one of the limited directions runs along them (an even number of `directions`), and
+    otherwise to what `longest_edges` says. So no positions can meet the limits from
+
+        sin(theta/2) = sqrt((L_max/L)^2 - 1)
+
+    on: 16.3 degrees at 1%. At even resolutions the angle is sharp: feasible positions were found
+    at 0.999 of it. At odd ones two corner triangles have two pins and a vertex on a taut outer
+    line, hence no freedom left, and their diagonals are overstretched a little before.
+
+    Parameters
+    ----------
+    turn_rate : of the ends against each other [degrees/s].
+    step : [s] between projections.
+    """
+
+    name = "twist"
+    needs = frozenset()
+
+    turn_rate: float = 90.0
+    step: float = 1 / 60
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not np.isfinite(self.turn_rate):
+            raise ValueError(f"turn_rate is {self.turn_rate}: a finite number is valid")
+        if not 0 < self.step < float("inf"):
+            raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
+
+    def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
+        """See the base class; the axis is x."""
+        rest, elements = square_grid(self.resolution, SIDE, "alternating")
+        positions = np.column_stack([rest[:, 0], np.zeros(len(rest)), rest[:, 1] - SIDE / 2])
+        ends = np.arange(self.resolution + 1)
+        return rest, elements, positions, np.concatenate([ends, ends + len(rest) - len(ends)])
+
+    def pin_positions(self, angle: float) -> FloatArray:
+        """(p, 3) the pins [m], the ends turned against each other by `angle` [rad]."""
+        _, _, positions, pinned = self.sheet()
+        x, _, z = positions[pinned].T
+        turn = np.where(x > SIDE / 2, angle / 2, -angle / 2)
+        return np.column_stack([x, z * np.sin(turn), z * np.cos(turn)])
+
+    @property
+    def infeasible_angle(self) -> float:
+        """The angle [rad] from which on no positions meet the limits; infinite if there is none."""
+        edges, lengths = longest_edges(self.problem())
+        rest = self.sheet()[0]
+        outer = np.all(rest[edges][..., 1] == 0, axis=1)
+        stretch = float(np.sum(lengths[outer])) / SIDE
+        sine = np.sqrt(stretch**2 - 1)
+        return 2 * float(np.arcsin(sine)) if sine <= 1 else float("inf")
+
+    def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
+        """Turn the pins, project, and so on."""
+        _, _, positions, pinned = self.sheet()
+        steps = 0
+        while True:
+            steps += 1
+            candidate = positions.copy()
+            time = steps * self.step
+            candidate[pinned] = self.pin_positions(np.deg2rad(self.turn_rate) * time)
+            positions = project(candidate)
+            yield StepReport(time=time)
