@@ -78,8 +78,9 @@ class Drape(Scenario):
         if self.shape == "orthotropic":
             curve: FloatArray = np.hypot(np.cos(angles) / tight, np.sin(angles) / 1.30) ** -1
             return curve
-        first = 0.25 * np.sin(angles - np.deg2rad(30)) ** 2
-        return tight + first + 0.10 * np.sin(2 * (angles - np.deg2rad(10))) ** 2
+        first: FloatArray = 0.25 * np.sin(angles - np.deg2rad(30)) ** 2
+        second: FloatArray = 0.10 * np.sin(2 * (angles - np.deg2rad(10))) ** 2
+        return tight + first + second
 
     def curve(self) -> tuple[FloatArray, FloatArray]:
         """Angles (a,) [rad] in [-pi/2, pi/2) and the bounds there: the curve, for polar plots."""
