@@ -52,6 +52,11 @@ def _read_only(array: FloatArray) -> FloatArray:
     return array
 
 
+def rest_corners(rest: FloatArray, elements: IntArray) -> FloatArray:
+    """(e, k, dim) material positions of each element's own corners [m], however `rest` is given."""
+    return rest[elements] if rest.ndim == 2 else rest
+
+
 def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, FloatArray]:
     """Gradients B of the linear shape functions, and the elements' areas or volumes.
 
@@ -67,9 +72,9 @@ def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, F
     ValueError
         Naming the first element without area or volume, to working precision.
     """
-    corners = rest[elements]
+    corners = rest_corners(rest, elements)
     edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    dim = rest.shape[1]
+    dim = rest.shape[-1]
     determinant = np.linalg.det(edges)
     size = np.abs(edges).max(axis=(1, 2), initial=0) ** dim
     flat = np.flatnonzero(np.abs(determinant) <= 1e-14 * size)
@@ -90,7 +95,9 @@ class Problem:
     Parameters
     ----------
     rest : (n, 2) or (n, 3)
-        Material positions [m] of a surface, or of a volume.
+        Material positions [m] of a surface, or of a volume. Or (e, 3, 2) or (e, 4, 3): those of
+        each element's own corners, for pieces sewn together along seams, and for shapes that do
+        not lie flat as a whole; each element then has material axes of its own.
     elements : (e, 3) or (e, 4)
         Vertex indices of triangles, or of tetrahedra.
     target : (n, 3)
@@ -121,11 +128,20 @@ class Problem:
         def put(name: str, value: object) -> None:
             object.__setattr__(self, name, value)
 
-        put("rest", frozen_array("rest", self.rest, 2))
-        n, dim = self.rest.shape
+        put("rest", frozen_array("rest", self.rest, 2, 3))
+        dim = self.rest.shape[-1]
         if dim not in (2, 3):
-            raise ValueError(f"rest: shape {self.rest.shape}; valid are (n, 2) and (n, 3)")
-        put("elements", _index_array("elements", self.elements, 2, n))
+            valid = "(n, 2), (n, 3), (e, 3, 2) and (e, 4, 3)"
+            raise ValueError(f"rest: shape {self.rest.shape}; valid are {valid}")
+        per_corner = self.rest.ndim == 3
+        if per_corner:
+            put("target", frozen_array("target", self.target, 2))
+        put("elements", _index_array("elements", self.elements, 2, self.vertices))
+        if per_corner and self.rest.shape[:2] != self.elements.shape:
+            raise ValueError(
+                f"rest: shape {self.rest.shape} for elements of shape {self.elements.shape}; "
+                f"one material position for each corner of each element is valid"
+            )
         if len(self.elements) == 0 or self.elements.shape[1] != dim + 1:
             raise ValueError(
                 f"elements: shape {self.elements.shape}; rest has {dim} coordinates, "
@@ -149,15 +165,15 @@ class Problem:
 
     def _checked_target(self, target: ArrayLike) -> FloatArray:
         array = frozen_array("target", target, 2)
-        if array.shape != (len(self.rest), 3):
+        n = self.vertices
+        if array.shape != (n, 3):
             raise ValueError(
-                f"target: shape {array.shape}, but rest has {len(self.rest)} vertices, "
-                f"so ({len(self.rest)}, 3) is valid"
+                f"target: shape {array.shape}, but rest has {n} vertices, so ({n}, 3) is valid"
             )
         return array
 
     def _checked_pins(self) -> IntArray:
-        pins = _index_array("pinned", self.pinned, 1, len(self.rest))
+        pins = _index_array("pinned", self.pinned, 1, self.vertices)
         values, counts = np.unique(pins, return_counts=True)
         for vertex in values[counts > 1][:1]:
             second = np.flatnonzero(pins == vertex)[1]
@@ -168,8 +184,8 @@ class Problem:
         if self.mass is None:
             return None
         mass = frozen_array("mass", self.mass, 1)
-        if len(mass) != len(self.rest):
-            raise ValueError(f"mass: {len(mass)} entries for {len(self.rest)} vertices")
+        if len(mass) != self.vertices:
+            raise ValueError(f"mass: {len(mass)} entries for {self.vertices} vertices")
         for vertex in np.flatnonzero(mass <= 0)[:1]:
             raise ValueError(f"mass[{vertex}] is {mass[vertex]}: a mass must be above 0")
         return mass
@@ -192,7 +208,7 @@ class Problem:
     @property
     def vertices(self) -> int:
         """Number of vertices n."""
-        return len(self.rest)
+        return len(self.rest) if self.rest.ndim == 2 else len(self.target)
 
     @property
     def rows(self) -> int:
@@ -231,7 +247,7 @@ class Problem:
     @cached_property
     def edge_length(self) -> float:
         """Mean rest length of the elements' edges [m]: the problem's own length unit."""
-        corners = self.rest[self.elements]
+        corners = rest_corners(self.rest, self.elements)
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
 
     @cached_property
@@ -339,12 +355,14 @@ def longest_edges(problem: Problem) -> tuple[IntArray, FloatArray]:
     lengths : (k,)
         Upper bound on the deformed length [m].
     """
-    dim = problem.rest.shape[1]
+    dim = problem.rest.shape[-1]
     directions = problem.limits.directions
     bounds = problem.bounds.reshape(len(problem.elements), len(directions))
     pairs = list(combinations(range(dim + 1), 2))
     ends = problem.elements[:, pairs]
-    vectors = problem.rest[ends[..., 1]] - problem.rest[ends[..., 0]]
+    corners = rest_corners(problem.rest, problem.elements)
+    first, second = np.array(pairs).T
+    vectors = corners[:, second] - corners[:, first]
     longest = np.full(ends.shape[:2], np.inf)
     for chosen in combinations(range(len(directions)), dim):
         basis = directions[list(chosen)].T

@@ -160,7 +160,7 @@ def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
 
     Volumes are left to compile on the clock's first projection.
     """
-    if problem.rest.shape[1] != 2:
+    if problem.rest.shape[-1] != 2:
         return
     rest, elements = square_grid(2, 1.0, "uniform")
     bounds = np.atleast_2d(problem.limits.bounds)[0]

@@ -444,3 +444,77 @@ def test_no_feasible_point_has_more_than_the_largest_objective(seed):
     assert problem.objective(placed) <= problem.largest_objective
     if len(problem.pinned) == 1:
         assert problem.objective(turned) <= problem.largest_objective
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_rest_by_corner_is_the_same_problem(seed):
+    rng = np.random.default_rng(seed)
+    shared = random_problem(rng) if seed % 2 else random_tetrahedra(rng)
+    problem = Problem(
+        shared.rest[shared.elements],
+        shared.elements,
+        shared.target,
+        shared.limits,
+        shared.pinned,
+        shared.mass,
+    )
+    assert problem.vertices == shared.vertices
+    np.testing.assert_array_equal(problem.G.toarray(), shared.G.toarray())
+    np.testing.assert_array_equal(problem.measures, shared.measures)
+    assert problem.edge_length == shared.edge_length
+    for ours, theirs in zip(longest_edges(problem), longest_edges(shared), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_each_element_may_have_a_frame_of_its_own():
+    rng = np.random.default_rng(3)
+    shared = triangle()
+    turn = np.stack([rotation(rng)[:2, :2] for _ in range(2)])
+    turn = np.linalg.qr(turn)[0]
+    corners = np.einsum("ekc,ecd->ekd", shared.rest[shared.elements], turn) + rng.normal(
+        size=(2, 1, 2)
+    )
+    problem = triangle(rest=corners)
+    x = rng.normal(size=(4, 3))
+    ours, theirs = (
+        np.linalg.svd(p.deformation_gradients(x), compute_uv=False) for p in (problem, shared)
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=1e-10)
+
+
+def test_a_seam_joins_two_squares_of_cloth():
+    # two unit squares, apart in the pattern and sewn along an edge: pins 2 b apart at most
+    square = np.array([[[0.0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]]])
+    rest = np.concatenate([square, square + 7.0])
+    elements = [[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]]
+    target = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 1, 0], [1, 1, 0], [2, 1, 0.0]])
+    problem = Problem(rest, elements, target, StretchLimits.isotropic(1.1), pinned=[0, 2])
+    np.testing.assert_allclose(problem.stretches(target), 1)
+    assert problem.with_target(1.099 * target).infeasible_pins() is None
+    assert "vertices 0 and 2" in problem.with_target(1.101 * target).infeasible_pins()
+    found = solve(problem.with_target(1.05 * target), "clarabel").positions
+    np.testing.assert_allclose(found, 1.05 * target, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"rest": np.zeros((1, 3, 2))}, r"rest: shape \(1, 3, 2\) for elements of shape \(2, 3\)"),
+        ({"rest": np.zeros((2, 3, 4))}, r"rest: shape \(2, 3, 4\); valid are"),
+        ({"rest": np.zeros((2, 3, 2))}, r"elements\[0\] .* has no rest area"),
+        ({"rest": np.ones((2, 3, 2)), "target": np.zeros(3)}, r"target: expected 2 dimensions"),
+        ({"rest": np.ones((2, 3, 2)), "target": np.zeros((3, 3))}, r"elements\[1, 1\] is 3"),
+        ({"rest": np.ones((2, 3, 2)), "target": np.zeros((4, 2))}, r"target: shape \(4, 2\)"),
+        ({"rest": np.ones((2, 3, 2)), "mass": np.ones(5)}, r"mass: 5 entries for 4 vertices"),
+    ],
+)
+def test_bad_rest_by_corner_is_named(changes, match):
+    with pytest.raises(ValueError, match=match):
+        triangle(**changes)
+
+
+def test_a_new_target_of_another_size_is_refused_with_rest_by_corner():
+    shared = triangle()
+    problem = triangle(rest=shared.rest[shared.elements])
+    with pytest.raises(ValueError, match=r"target: shape \(5, 3\)"):
+        problem.with_target(np.zeros((5, 3)))

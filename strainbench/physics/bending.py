@@ -12,7 +12,7 @@ from numba import njit
 
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import scatter
-from strainbench.problem import IntArray
+from strainbench.problem import IntArray, rest_corners
 
 
 def hinges(rest: FloatArray, elements: IntArray, areas: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -23,20 +23,22 @@ def hinges(rest: FloatArray, elements: IntArray, areas: FloatArray) -> tuple[Int
     hinges : (h, 4)
         Vertices x0, x1 of the edge, then x2, x3 across it; x0, x1, x2 turn as their triangle.
     weights : (h,)
-        3 |e|^2 / (A1 + A2) at rest, without unit.
+        3 |e|^2 / (A1 + A2) at rest, without unit; of the mean length where a seam's sides differ.
     """
-    seen: dict[tuple[int, int], tuple[int, int, int, int]] = {}
+    corners = rest_corners(rest, elements)
+    lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    seen: dict[tuple[int, int], tuple[int, int, int, int, int]] = {}
     quads, weights = [], []
     for t, triangle in enumerate(elements.tolist()):
         for c in range(3):
             a, b, across = triangle[c], triangle[(c + 1) % 3], triangle[(c + 2) % 3]
             key = (min(a, b), max(a, b))
             if key not in seen:
-                seen[key] = (a, b, across, t)
+                seen[key] = (a, b, across, t, c)
                 continue
-            x0, x1, x2, other = seen[key]
+            x0, x1, x2, other, corner = seen[key]
             quads.append((x0, x1, x2, across))
-            length2 = float(np.sum((rest[x1] - rest[x0]) ** 2))
+            length2 = (0.5 * float(lengths[t, c] + lengths[other, corner])) ** 2
             weights.append(3 * length2 / (areas[t] + areas[other]))
     return np.array(quads, dtype=np.int64).reshape(-1, 4), np.array(weights)
 

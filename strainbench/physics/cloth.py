@@ -40,8 +40,8 @@ class Cloth:
 
     Parameters
     ----------
-    rest : (n, 2) [m]
-    elements : (e, 3)
+    rest : (n, 2), or (e, 3, 2) for the corners of each triangle [m]
+    elements : (e, 3); with rest by corner, their largest index is the last vertex
     material : Material
     pinned : (p,) vertices that are not unknowns of a step
     contact : what the vertices are kept off, or None
@@ -57,11 +57,16 @@ class Cloth:
     def _shape(self) -> tuple[FloatArray, FloatArray]:
         return shape_gradients(self.rest, self.elements)
 
+    @property
+    def vertices(self) -> int:
+        """Number of vertices n."""
+        return len(self.rest) if self.rest.ndim == 2 else int(self.elements.max()) + 1
+
     @cached_property
     def mass(self) -> FloatArray:
         """(n,) [kg]: a third of each triangle's mass at each of its vertices."""
         element_mass = self.material.density * self.material.thickness * self._shape[1]
-        mass = np.zeros(len(self.rest))
+        mass = np.zeros(self.vertices)
         np.add.at(mass, self.elements, element_mass[:, None] / 3)
         return mass
 
@@ -92,7 +97,7 @@ class Cloth:
     @cached_property
     def pattern(self) -> Pattern:
         """Sparsity of the Hessian on the free vertices, found once."""
-        return Pattern.of([self.elements, self._hinges[0]], len(self.rest), self.pinned)
+        return Pattern.of([self.elements, self._hinges[0]], self.vertices, self.pinned)
 
     @cached_property
     def linear_solver(self) -> LinearSolver:
