@@ -41,8 +41,8 @@ class Chainmail(ClothScenario):
     limit : the largest strain over all directions; it scales the pattern's curve.
     directions : samples of the pattern's curve.
     pattern : "rows" or "hexagonal".
-    curve : path of a measured curve, a CSV file with the columns angle_degrees and bound. It is
-        taken as it stands, so `limit`, `directions` and `pattern` then stay at their defaults.
+    curve_file : path of a measured curve, a CSV file with the columns angle_degrees and bound.
+        It is taken as it stands: `limit`, `directions` and `pattern` stay at their defaults.
     """
 
     name = "chainmail"
@@ -52,28 +52,28 @@ class Chainmail(ClothScenario):
     directions: int = 18
     norm: str = "mass"
     pattern: str = "rows"
-    curve: str = ""
+    curve_file: str = ""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.pattern not in PATTERNS:
             valid = ", ".join(PATTERNS)
             raise ValueError(f"pattern is {self.pattern!r}: valid are {valid}")
-        if not self.curve:
+        if not self.curve_file:
             return
-        if not Path(self.curve).is_file():
-            raise ValueError(f"curve is {self.curve!r}: no such file")
+        if not Path(self.curve_file).is_file():
+            raise ValueError(f"curve_file is {self.curve_file!r}: no such file")
         for key in ("limit", "directions", "pattern"):
             if getattr(self, key) != getattr(type(self), key):
                 raise ValueError(
                     f"{key} is {getattr(self, key)}: a measured curve is taken as it stands, "
-                    f"so set {key} or curve, not both"
+                    f"so set {key} or curve_file, not both"
                 )
         self.limits()
 
-    def limit_curve(self) -> tuple[FloatArray, FloatArray]:
+    def curve(self) -> tuple[FloatArray, FloatArray]:
         """Angles [rad] and largest stretches of the underlying curve: samples of a measured one."""
-        if self.curve:
+        if self.curve_file:
             measured = self.limits()
             x, y = measured.directions.T
             return np.arctan2(y, x), measured.bounds
@@ -82,8 +82,8 @@ class Chainmail(ClothScenario):
 
     def limits(self) -> StretchLimits:
         """The curve at equally spaced angles in [-pi/2, pi/2), or a measured one."""
-        if self.curve:
-            return StretchLimits.from_csv(self.curve)
+        if self.curve_file:
+            return StretchLimits.from_csv(self.curve_file)
         angles = -np.pi / 2 + np.pi * np.arange(self.directions) / self.directions
         return StretchLimits.sampled(angles, 1 + self.limit * PATTERNS[self.pattern](angles))
 

@@ -223,7 +223,7 @@ def test_the_wind_carries_the_flag_out_of_its_plane():
 @pytest.mark.parametrize("pattern", PATTERNS)
 def test_the_limit_is_the_largest_strain_of_the_curve(pattern):
     scene = Chainmail(pattern=pattern, limit=0.3)
-    angles, bounds = scene.limit_curve()
+    angles, bounds = scene.curve()
     assert bounds.max() == pytest.approx(1.3)
     assert bounds.min() > 1
     assert bounds[0] == pytest.approx(bounds[-1])
@@ -237,19 +237,19 @@ def test_the_limit_is_the_largest_strain_of_the_curve(pattern):
 def test_a_measured_curve_is_taken_as_it_stands(tmp_path):
     path = tmp_path / "measured.csv"
     path.write_text("angle_degrees,bound\n-90,1.1\n0,1.2\n45,1.4\n")
-    scene = Chainmail(resolution=3, curve=str(path))
+    scene = Chainmail(resolution=3, curve_file=str(path))
     np.testing.assert_allclose(scene.problem().limits.bounds, [1.1, 1.2, 1.4])
-    np.testing.assert_allclose(np.rad2deg(scene.limit_curve()[0]), [-90, 0, 45], atol=1e-12)
+    np.testing.assert_allclose(np.rad2deg(scene.curve()[0]), [-90, 0, 45], atol=1e-12)
     for key, value in (("limit", 0.1), ("directions", 4), ("pattern", "hexagonal")):
         with pytest.raises(ValueError, match=f"{key} is {value}.*not both"):
             replace(scene, **{key: value})
 
 
 def test_a_curve_or_pattern_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(ValueError, match=r"curve is 'nowhere\.csv': no such file"):
-        Chainmail(curve="nowhere.csv")
+    with pytest.raises(ValueError, match=r"curve_file is 'nowhere\.csv': no such file"):
+        Chainmail(curve_file="nowhere.csv")
     with pytest.raises(ValueError, match="pattern is 'knit': valid are rows, hexagonal"):
         Chainmail(pattern="knit")
     (tmp_path / "bad.csv").write_text("angle,bound\n0,1.1\n")
     with pytest.raises(ValueError, match="columns"):
-        Chainmail(curve=str(tmp_path / "bad.csv"))
+        Chainmail(curve_file=str(tmp_path / "bad.csv"))
