@@ -42,7 +42,7 @@ class Chainmail(ClothScenario):
     directions : samples of the pattern's curve.
     pattern : "rows" or "hexagonal".
     curve_file : path of a measured curve, a CSV file with the columns angle_degrees and bound.
-        It is taken as it stands; `limit`, `directions` and `pattern` then stay at their defaults.
+        It is taken as it stands: `limit`, `directions` and `pattern` stay at their defaults.
     """
 
     name = "chainmail"
