@@ -23,7 +23,8 @@ class PluginRef:
     label : with what sets it apart from the defaults
     parameters : all its fields
     path : of the file that it came from, or None for one of ours
-    content : digest of that file, when the run was planned: an edited file is another plug-in
+    content : digest of that file, and of files that its parameters name, when the run was
+        planned: an edited file is another plug-in
     unavailable : why it cannot be loaded, or None
     """
 
@@ -37,7 +38,9 @@ class PluginRef:
     @classmethod
     def of(cls, plugin: Solver | Scenario, path: str | None = None) -> PluginRef:
         """A reference to `plugin`, from the file at `path` unless it is ours."""
-        content = _digest(Path(path).read_text()) if path else ""
+        named = [v for v in plugin.parameters.values() if isinstance(v, str) and Path(v).is_file()]
+        files = [*([path] if path else []), *named]
+        content = _digest([Path(f).read_bytes().hex() for f in files]) if files else ""
         return cls(plugin.name, plugin.label, tuple(plugin.parameters.items()), path, content)
 
     def solver(self) -> Solver:

@@ -269,6 +269,15 @@ def test_an_edited_file_is_another_cell(mine):
     assert cells(solvers=[str(mine)])[0].key == before
 
 
+def test_an_edited_file_that_a_setting_names_is_another_cell(tmp_path):
+    curve = tmp_path / "curve.csv"
+    keys = set()
+    for bound in (1.1, 1.2):
+        curve.write_text(f"angle_degrees,bound\n0,{bound}\n45,1.3\n90,1.1\n")
+        keys.add(cells(scenarios=["chainmail"], settings=[f"curve_file={curve}"])[0].key)
+    assert len(keys) == 2
+
+
 def test_a_moved_file_is_the_same_cell(mine, tmp_path):
     before = cells(solvers=[str(mine)])[0].key
     (tmp_path / "elsewhere").mkdir()

@@ -28,7 +28,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.linalg import splu
 
 from strainbench.limits import FloatArray
 from strainbench.physics.cloth import Cloth
@@ -91,17 +90,12 @@ def constrained_minimum(
     free, M, h, r = cloth.pattern.free, cloth.mass[:, None], settings.step, settings.relaxation
     weight = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[free]))
     z, u = start.copy(), np.zeros_like(start)
-    gradient = potential(cloth, z)[-1]
+    gradient, linear = potential(cloth, z)[-1], cloth.linear_solver
     count = 0
     while True:
-        factor = splu(
-            cloth.hessian(z, cloth.mass / h**2),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
+        linear.factorise(cloth.hessian_values(z, cloth.mass / h**2))
         x = z.copy()  # 1
-        x[free] -= factor.solve((gradient + M * u / h**2)[free].ravel()).reshape(-1, 3)
+        x[free] -= linear.solve((gradient + M * u / h**2)[free].ravel()).reshape(-1, 3)
         before, relaxed = z, r * x + (1 - r) * z
         z = project(relaxed + u)  # 2
         u = relaxed + u - z  # 3
