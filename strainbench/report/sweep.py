@@ -26,7 +26,9 @@ def sweeps(runs: pd.DataFrame) -> dict[str, pd.DataFrame]:
             rest = [{k: v for k, v in p.items() if k != key} for p in parameters]
             rows["rest"] = [json.dumps(r, sort_keys=True) for r in rest]
             rows = rows[(rows["solver"] != UNCONSTRAINED) & rows["value"].notna()]
-            found[key] = rows.sort_values("value", kind="stable")
+            rows = rows[rows.groupby("rest")["value"].transform("nunique") >= FEWEST]
+            if len(rows):
+                found[key] = rows.sort_values("value", kind="stable")
     return found
 
 
@@ -35,8 +37,6 @@ def sweep_markdown(runs: pd.DataFrame) -> list[str]:
     parts = []
     for key, rows in sweeps(runs).items():
         for (_, mode), group in rows.groupby(["rest", "mode"], sort=False):
-            if group["value"].nunique() < FEWEST:
-                continue
             first = group.iloc[0]
             about = describe(first["rest"])
             solvers = list(dict.fromkeys(group["solver"]))
@@ -61,14 +61,13 @@ def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:
     for key, rows in sweeps(runs).items():
         figure = Figure(figsize=(9.5, 3.6), layout="constrained")
         axes = figure.subplots(1, 2)
-        style = styles(list(dict.fromkeys(rows["solver"])))
         several = rows["rest"].nunique() > 1
-        for (solver, rest), line in rows.groupby(["solver", "rest"], sort=False):
+        lines = list(rows.groupby(["solver", "rest"], sort=False))
+        style = styles([f"{solver} {rest}" for (solver, rest), _ in lines])
+        for (solver, rest), line in lines:
             label = solver if not several else f"{solver}, {_differs(rest, rows)}"
             answered = line[line["outcome"] != "no answer"]
-            look = {**style[solver], "markersize": 5, "linewidth": 1.2}
-            if several:
-                look.pop("color")
+            look = {**style[f"{solver} {rest}"], "markersize": 5, "linewidth": 1.2}
             axes[0].plot(answered["value"], answered["solve_seconds_mean"], label=label, **look)
             millimetres = (1000 * answered["distance_max"]).clip(lower=FLOOR_MM)
             axes[1].plot(answered["value"], millimetres, **look)
@@ -80,7 +79,7 @@ def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:
                 ax.set_xscale("log")
             values = sorted(rows["value"].unique())
             ax.set_xticks(values, [f"{v:.3g}" for v in values], size=8)
-            ax.minorticks_off()
+            ax.xaxis.minorticks_off()
             ax.set_xlabel(key)
             ax.set_ylabel(name)
             ax.grid(visible=True, color="#dddddd", linewidth=0.6)
