@@ -200,7 +200,8 @@ def _outcome(
         outcome = max((c.outcome for c in certificates), key=OUTCOMES.index)
         worst = [c for c in certificates if c.outcome == outcome]
         if outcome != "optimal":
-            found = max(worst, key=lambda c: (c.max_violation, c.relative_gap)).reason
+            measure = "max_violation" if outcome == "violated" else "relative_gap"
+            found = max(worst, key=lambda c: float(getattr(c, measure))).reason
             reasons.append(f"{len(worst)} of {len(certificates)} projections: {found} at worst")
     unconverged = sum(e["event"] == "step" and not e["newton_converged"] for e in events)
     if unconverged:
