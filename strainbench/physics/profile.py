@@ -78,9 +78,9 @@ def _measure(
 def table(measured: dict[str, list[Measured]], title: str) -> Table:
     """A row a linear solver."""
     grid = Table(title=title, caption="medians over the steps; ratio: step / (assemb. + factor.)")
-    for name in ("linear solver", "converged", "iterations", "factor.", "evaluations", "step [ms]"):
+    for name in ("solver", "converged", "iterations", "factor.", "evaluations", "step [ms]"):
         grid.add_column(name, justify="right")
-    for name in ("assembly", "factorisation", "line search", "other", "ratio", "worst ratio"):
+    for name in ("assembly", "factorisation", "line search", "other", "ratio", "worst"):
         grid.add_column(name, justify="right")
     for name, steps in measured.items():
         reports = [m.report for m in steps]
@@ -120,7 +120,7 @@ def run(
     profile(kind(resolution=2, step=step), 1)  # compiles
     measured = profile(kind(resolution=resolution, step=step), steps)
     title = f"{name} {resolution}x{resolution}, {steps} steps of {step:.4g} s"
-    Console(width=140).print(table(measured, title))
+    Console(width=150).print(table(measured, title))
 
 
 if __name__ == "__main__":
