@@ -107,8 +107,8 @@ class RecordsError(ValueError):
     """A results folder that cannot be used, in one line."""
 
 
-def open_folder(folder: Path) -> None:
-    """Make sure that `folder` exists and can be written to; RecordsError if not."""
+def open_folder(folder: Path, option: str = "--results") -> None:
+    """Make sure that `folder`, given by `option`, can be written to; RecordsError if not."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".writable"
@@ -116,7 +116,7 @@ def open_folder(folder: Path) -> None:
         probe.unlink()
     except OSError as error:
         raise RecordsError(
-            f"{folder} cannot be written to ({error.strerror}): give --results a folder of yours"
+            f"{folder} cannot be written to ({error.strerror}): give {option} a folder of yours"
         ) from None
 
 

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from PIL import Image
 
+from strainbench.records import open_folder
 from strainbench.render.animation import write_gif, write_mp4
 from strainbench.render.export import MESH_FORMATS, write_meshes
 from strainbench.render.film import (
@@ -17,7 +18,6 @@ from strainbench.render.film import (
     cells_to_draw,
     shoot,
     untracked,
-    writable_folder,
 )
 from strainbench.render.picture import DPI, Camera, Picture
 
@@ -87,7 +87,7 @@ def render(
         raise ValueError(f"--solver and --set give {len(cells)} solvers ({labels}): one is valid")
     if every < 1:
         raise ValueError(f"--every {every}: a whole number above 0 is valid")
-    writable_folder(folder)
+    open_folder(folder, "-o")
     film = shoot(cells[0], every, track)
     lines = [film.stopped] if film.stopped else []
     return lines + write_film(film, kinds, folder, camera, top, track)

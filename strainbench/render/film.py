@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -146,16 +145,3 @@ class _Stage:
             raise _Cut(f"no usable positions; it says {str(solution.status)!r}")
         self.positions = positions
         return positions
-
-
-def writable_folder(folder: Path) -> None:
-    """Make sure that `folder` exists and can be written to; ValueError in one line if not."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe = folder / ".writable"
-        probe.write_text("")
-        probe.unlink()
-    except OSError as error:
-        raise ValueError(
-            f"-o {folder} cannot be written to ({error.strerror}): a folder of yours is valid"
-        ) from None

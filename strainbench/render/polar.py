@@ -16,7 +16,8 @@ from scipy.optimize import linprog
 
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.problem import Problem
-from strainbench.render.film import Film, Track, cells_to_draw, shoot, untracked, writable_folder
+from strainbench.records import open_folder
+from strainbench.render.film import Film, Track, cells_to_draw, shoot, untracked
 from strainbench.report.chart import COLOURS
 
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -85,7 +86,7 @@ def polar(
     scene = cells[0].scenario.scenario()
     if scene.problem().rest.shape[1] != 2:
         raise ValueError(f"{scenario} is a volume: a scene of cloth is valid")
-    writable_folder(path.parent)
+    open_folder(path.parent, "-o")
     films = [shoot(cell, every=steps, track=track) for cell in cells]
     figure = draw_polar(films, scene.curve())
     stamp = {".png": None, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
