@@ -35,11 +35,11 @@ check: setup ## format, lint, types, tests
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -q
 
-perf: setup ## pytest-benchmark on recorded frames; writes $(LOCAL)/perf.json
+perf: setup ## pytest-benchmark on recorded frames; writes results/local/perf.json
 	@mkdir -p $(LOCAL)
 	$(BIN)/python -m pytest tests/perf -o addopts= --benchmark-json=$(LOCAL)/perf.json
 
-report: setup ## tables and charts from $(BENCH) again
+report: setup ## tables and charts from results/local/bench again
 	$(BIN)/strainbench report --results $(BENCH)
 
 clean: ## remove the virtual environment and caches, keep every result

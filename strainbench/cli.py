@@ -55,7 +55,7 @@ def list_(
 
 def _entries(title: str, entries: Sequence[Entry]) -> Table:
     table = Table(title=title, title_justify="left", title_style="bold")
-    for column in ("name", "method", "paper", "available"):
+    for column in ("name", "method" if title == "solvers" else "scene", "paper", "available"):
         table.add_column(column, overflow="fold", no_wrap=column == "name")
     for e in entries:
         table.add_row(e.name, e.method, e.paper, e.unavailable or "yes")
