@@ -1,7 +1,7 @@
 """Running cells: each in a process of its own, watched, stopped at its limits, then judged.
 
 The cells run `jobs` at a time; the referee works in one more process, on the frames of the cells
-that have ended, with one job only while no cell's clock runs: beside one it makes times 5 to 10%
+that have ended, with one job only while no cell's clock runs: beside one it made times 5 to 11%
 longer. Rows are appended as they come, so an interrupted run loses only what was running, and the
 next one resumes.
 """
