@@ -17,7 +17,7 @@ from strainbench.physics.linear import (
     best_linear_solver,
     symmetric,
 )
-from strainbench.physics.profile import profile, table
+from strainbench.physics.profile import profile, run, table
 
 
 @pytest.fixture(params=[Cholmod, SuperLU], ids=lambda kind: kind.name)
@@ -113,3 +113,16 @@ def test_newton_converges_on_the_swing(h):
         assert all(m.report.converged for m in steps)
         assert all(m.ratio >= 1 for m in steps)
     assert table(measured, "swing").row_count == len(measured)
+
+
+@pytest.mark.parametrize(
+    ("scene", "step", "line"),
+    [
+        ("swim", 0.01, "no scenario called 'swim'; valid are"),
+        ("twist", 0.01, "twist has no cloth that moves by implicit Euler"),
+        ("swing", -1.0, "step is -1.0: a number of seconds above 0 is valid"),
+    ],
+)
+def test_a_wrong_word_to_the_profile_is_one_line(scene, step, line):
+    with pytest.raises(SystemExit, match=line):
+        run(scene, 2, 1, step)

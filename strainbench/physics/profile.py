@@ -114,11 +114,15 @@ def run(
     step: Annotated[float, typer.Option(help="time step [s]")] = 1 / 60,
 ) -> None:
     """Print the split of implicit Euler's time on SCENARIO."""
-    kind = find_scenario(name)
-    if not issubclass(kind, ClothScenario):
-        raise typer.BadParameter(f"{name} has no cloth that moves by implicit Euler")
-    profile(kind(resolution=2, step=step), 1)  # compiles
-    measured = profile(kind(resolution=resolution, step=step), steps)
+    try:
+        kind = find_scenario(name)
+        if not issubclass(kind, ClothScenario):
+            raise ValueError(f"{name} has no cloth that moves by implicit Euler")
+        small, scene = (kind(resolution=n, step=step) for n in (2, resolution))
+    except ValueError as error:
+        raise SystemExit(f"strainbench.physics.profile: {error}") from None
+    profile(small, 1)  # compiles
+    measured = profile(scene, steps)
     title = f"{name} {resolution}x{resolution}, {steps} steps of {step:.4g} s"
     Console(width=150).print(table(measured, title))
 
