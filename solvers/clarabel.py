@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.conic import ConicForm
 from strainbench.limits import FloatArray
 
 
@@ -88,8 +89,7 @@ class Clarabel(Solver):
         state.solver.update(q=q, b=rhs, settings=settings)
         result = state.solver.solve()
         status = str(result.status)
-        positions = problem.target.copy()
-        positions[problem.free] = state.free_positions(problem, np.array(result.x))
+        positions = state.positions(problem, np.array(result.x))
         if "Infeasible" in status:
             positions[:] = np.nan
         return Solution(
@@ -104,32 +104,28 @@ class QuadraticForm:
     """Displacements as unknowns, the objective as a quadratic, one 4-cone a constraint."""
 
     def __init__(self, problem: Problem, settings: Any, scaling: float | None) -> None:
-        n, m = len(problem.free), problem.rows
-        self.scale = 1.0 if scaling is None else scaling / problem.edge_length**2
-        weights = self.scale * np.repeat(problem.weights[problem.free], 3)
-        blocks = sp.kron(problem.G[:, problem.free], sp.eye_array(4, 3, k=-1))
-        self.unknowns = 3 * n
+        self.form = ConicForm(problem, scaling)
+        q, rhs = self.vectors(problem)
         self.solver = clarabel.DefaultSolver(
-            sp.csc_matrix(sp.diags_array(weights)),
-            np.zeros(self.unknowns),
-            -sp.csc_matrix(blocks),
-            self.vectors(problem)[1],
-            [clarabel.SecondOrderConeT(4)] * m,
+            sp.csc_matrix(self.form.P),
+            q,
+            sp.csc_matrix(self.form.A),
+            rhs,
+            [clarabel.SecondOrderConeT(4)] * self.form.count,
             settings,
         )
 
     def vectors(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
-        """No linear objective; rows (b_i, (G target)_i)."""
-        rhs = np.column_stack([problem.bounds, problem.G @ problem.target])
-        return np.zeros(self.unknowns), rhs.ravel()
+        """No linear objective, and the cones' constants."""
+        return np.zeros(len(problem.free) * 3), self.form.constants(problem)
 
-    def free_positions(self, problem: Problem, z: FloatArray) -> FloatArray:
+    def positions(self, problem: Problem, z: FloatArray) -> FloatArray:
         """Target plus displacement."""
-        return problem.target[problem.free] + z.reshape(-1, 3)
+        return self.form.positions(problem, z)
 
     def multipliers(self, duals: FloatArray) -> FloatArray:
-        """The vector part of each cone's dual, in the problem's own units."""
-        return -duals.reshape(-1, 4)[:, 1:] / self.scale
+        """See `ConicForm`."""
+        return self.form.multipliers(duals)
 
 
 class PaperForm:
@@ -183,9 +179,11 @@ class PaperForm:
         limits = np.tile([0.5, 0.5, 0.0, 0.0, 0.0], self.m)
         return q, np.concatenate([problem.bounds**2, -fixed.ravel(), objective, limits])
 
-    def free_positions(self, problem: Problem, z: FloatArray) -> FloatArray:
-        """The first unknowns."""
-        return z[: self.n].reshape(-1, 3)
+    def positions(self, problem: Problem, z: FloatArray) -> FloatArray:
+        """The first unknowns, and the pins."""
+        positions = problem.target.copy()
+        positions[problem.free] = z[: self.n].reshape(-1, 3)
+        return positions
 
     def multipliers(self, duals: FloatArray) -> FloatArray:
         """The duals of y_i = A_i x."""
