@@ -29,7 +29,7 @@ class ConicForm:
     Parameters
     ----------
     problem : any frame of the mesh.
-    scaling : factor s of the objective in units of 1/edge^2; None leaves it in the problem's.
+    scaling : factor s of the objective in units of 1/edge^2 over the mean weight; None is s = 1.
     triangle : "upper" or "lower", of semidefinite cones.
 
     Attributes
@@ -44,7 +44,8 @@ class ConicForm:
     def __init__(
         self, problem: Problem, scaling: float | None = None, triangle: str = "upper"
     ) -> None:
-        self.scale = 1.0 if scaling is None else scaling / problem.edge_length**2
+        unit = problem.edge_length**2 * float(problem.weights.mean())
+        self.scale = 1.0 if scaling is None else scaling / unit
         weights = np.repeat(problem.weights[problem.free], 3)
         self.P = sp.csc_array(sp.diags_array(self.scale * weights))
         self.count = problem.constraints
