@@ -35,11 +35,11 @@ class Clarabel(Solver):
     Parameters
     ----------
     form : "quadratic" or "paper"
-    scaling : factor s of the objective in units of 1/edge^2 over the mean mass; None leaves it as
-        it is. Tuned on
-        frames of the swing at 10 to 40 cells: from 1 to 256, the gap reached falls from 3e-6 to
-        7e-8 and the violation rises from 4e-9 to 2e-7; 16 is in between. At 64 (`tight`, the
-        referee's reference) the multipliers are good on every frame, for 15% more time.
+    scaling : factor s of the objective in units of 1/edge^2 over the mean mass, with lengths in
+        edges; None leaves both as they are. Tuned on frames of the swing at 10 to 40 cells: from
+        1 to 256, the gap reached falls from 3e-6 to 7e-8 and the violation rises from 4e-9 to
+        2e-7; 16 is in between. At 64 (`tight`, the referee's reference) the multipliers are good
+        on every frame, for 15% more time.
     equilibrate : Clarabel's own scaling; with the objective scaled it does harm.
     """
 

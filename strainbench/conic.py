@@ -1,10 +1,10 @@
 """The projection as a cone program: the data that conic solvers and their file formats take.
 
-With the free vertices' displacements u = x - target as unknowns,
+With the free vertices' displacements u = x - target as unknowns, in units of a length h,
 
     minimise 1/2 u'Pu  such that  A u + s = b,  each block of s in one and the same cone,
 
-where P = s M. This is Tang et al. 2022, Eq. 12, but for the objective, which is given as a
+where P = s h^2 M. This is Tang et al. 2022, Eq. 12, but for the objective, which is given as a
 quadratic, without a cone of its own. A constraint's block of s is
 
 - (b_i, (G x)_i) in the second-order cone of order 4, or
@@ -29,7 +29,8 @@ class ConicForm:
     Parameters
     ----------
     problem : any frame of the mesh.
-    scaling : factor s of the objective in units of 1/edge^2 over the mean weight; None is s = 1.
+    scaling : factor s of the objective in units of 1/edge^2 over the mean weight, with lengths in
+        units of the mean edge; None leaves both as they are.
     triangle : "upper" or "lower", of semidefinite cones.
 
     Attributes
@@ -38,16 +39,18 @@ class ConicForm:
     A : (length count, u)
     cone, order : "second-order" and 4, or "semidefinite" and 3 + dim, the matrices' order
     length, count : entries of s in one cone; how many cones
-    scale : s
+    scale, unit : s, and h [m]
     """
 
     def __init__(
         self, problem: Problem, scaling: float | None = None, triangle: str = "upper"
     ) -> None:
-        unit = problem.edge_length**2 * float(problem.weights.mean())
-        self.scale = 1.0 if scaling is None else scaling / unit
+        self.scale, self.unit = 1.0, 1.0
+        if scaling is not None:
+            self.unit = problem.edge_length
+            self.scale = scaling / (self.unit**2 * float(problem.weights.mean()))
         weights = np.repeat(problem.weights[problem.free], 3)
-        self.P = sp.csc_array(sp.diags_array(self.scale * weights))
+        self.P = sp.csc_array(sp.diags_array(self.scale * self.unit**2 * weights))
         self.count = problem.constraints
         if problem.limits.spectral:
             self.cone, self.order = "semidefinite", 3 + problem.rows // problem.constraints
@@ -66,7 +69,7 @@ class ConicForm:
         self._entries = (blocks + rows).reshape(-1, 3)
         pick = sp.csc_array(
             (
-                np.full(3 * problem.rows, -self._factor),
+                np.full(3 * problem.rows, -self._factor * self.unit),
                 (self._entries.ravel(), range(3 * problem.rows)),
             ),
             shape=(self.length * self.count, 3 * problem.rows),
@@ -84,7 +87,7 @@ class ConicForm:
     def positions(self, problem: Problem, u: FloatArray) -> FloatArray:
         """(n, 3) target plus displacement [m]."""
         positions = problem.target.copy()
-        positions[problem.free] += u.reshape(-1, 3)
+        positions[problem.free] += self.unit * u.reshape(-1, 3)
         return positions
 
     def multipliers(self, duals: FloatArray) -> FloatArray:
