@@ -9,7 +9,6 @@ from solvers.admm import Admm, Iteration
 from solvers.admm.anderson import Anderson
 from solvers.admm.rows import Rows
 from strainbench import certify, solve
-from strainbench.physics.linear import SuperLU
 from strainbench.solver import Clock
 from tests.problems import random_problem
 from tests.test_conic import exact
@@ -45,16 +44,6 @@ def test_the_matrix_is_the_mass_and_the_weighted_rows(rng):
     A = np.diag(problem.weights[problem.free]) + G.T @ (w[:, None] * G)
     b = rng.normal(size=(len(A), 3))
     assert rows.linear.solve(b) == pytest.approx(np.linalg.solve(A, b), rel=1e-8)
-
-
-def test_a_linear_solver_takes_several_right_hand_sides_at_once(rng):
-    problem = random_problem(rng)
-    rows = Rows(problem)
-    rows.factorise(np.ones(problem.rows))
-    b = rng.normal(size=(len(problem.free), 3))
-    one_by_one = np.column_stack([rows.linear.solve(column.copy()) for column in b.T])
-    assert isinstance(rows.linear, SuperLU) or rows.linear.name == "cholmod"
-    assert rows.linear.solve(b) == pytest.approx(one_by_one, rel=1e-12)
 
 
 @pytest.mark.parametrize("fields", [{}, {"memory": 6}, {"weights": "residuals", "relaxation": 1.0}])

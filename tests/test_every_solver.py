@@ -19,7 +19,16 @@ ROUGH = {
 }
 """Solvers that often end with limits violated, and the violation that their "solved" allows."""
 LIMITING = [n for n in NAMES if n != "none" and n not in ROUGH]
-TO_OPTIMALITY = ["clarabel", "clarabel-default", "cvxpy", "ipopt", "qoco", "admm", "linearized-qp"]
+TO_OPTIMALITY = [
+    "admm",
+    "clarabel",
+    "clarabel-default",
+    "cvxpy",
+    "ipopt",
+    "linearized-qp",
+    "newton-ipm",
+    "qoco",
+]
 """Solvers of the projection itself; the others stop at a point within the limits."""
 UNSCALED = [
     "clarabel-default",

@@ -8,7 +8,7 @@ from numba import njit
 
 from strainbench import Problem
 from strainbench.limits import FloatArray
-from strainbench.physics.linear import best_linear_solver
+from strainbench.physics.linear import SuperLU
 
 
 class Rows:
@@ -48,7 +48,7 @@ class Rows:
         self._mass = np.zeros(len(found))
         self._mass[index[len(i) :]] = problem.weights[problem.free]
         starts = np.searchsorted(found, n * np.arange(n + 1))
-        self.linear = best_linear_solver(sp.csc_array((self._mass, found % max(n, 1), starts)))
+        self.linear = SuperLU(sp.csc_array((self._mass, found % max(n, 1), starts)))
 
     def factorise(self, weights: FloatArray) -> None:
         """Take M + G^T W G with these weights (rows,)."""
