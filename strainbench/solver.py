@@ -96,6 +96,10 @@ class Solver(ABC):
             return "it has no form for exact limits, only for sampled directions"
         return None
 
+    def missing(self) -> str | None:
+        """None, or what these parameters need that is not installed."""
+        return None
+
     def prepare(self, problem: Problem) -> Any:  # noqa: ARG002
         """What is worth computing once a mesh; `solve` gets it back as `state`."""
         return None

@@ -11,10 +11,34 @@ from strainbench.discovery import UnavailableError, find_solver, list_solvers
 from tests.problems import random_problem
 
 NAMES = [e.name for e in list_solvers() if not e.unavailable]
-LIMITING = [n for n in NAMES if n != "none"]
-TO_OPTIMALITY = ["clarabel", "clarabel-default", "cvxpy", "ipopt", "newton-ipm"]
+ROUGH = {
+    "cvxpy-scs": 1e-6,
+    "cvxpy-scs-default": 1e-3,
+    "linearized-qp-default": 1e-6,
+    "linearized-qp-plain": 1e-6,
+}
+"""Solvers that often end with limits violated, and the violation that their "solved" allows."""
+LIMITING = [n for n in NAMES if n != "none" and n not in ROUGH]
+TO_OPTIMALITY = [
+    "admm",
+    "clarabel",
+    "clarabel-default",
+    "cvxpy",
+    "ipopt",
+    "linearized-qp",
+    "newton-ipm",
+    "qoco",
+]
 """Solvers of the projection itself; the others stop at a point within the limits."""
-UNSCALED = ["clarabel-default", "clarabel-paper", "ipopt-default"]
+UNSCALED = [
+    "clarabel-default",
+    "clarabel-paper",
+    "cvxpy-default",
+    "cvxpy-ecos-default",
+    "cvxpy-qoco-default",
+    "ipopt-default",
+    "qoco-default",
+]
 """Out of the box: an objective known to 1e-8 of its size leaves positions uncertain by 1e-4."""
 
 
@@ -73,6 +97,16 @@ def test_answers_lie_within_the_limits(name, seed):
         assert found.relative_gap < 1e-3, solution.status
 
 
+@pytest.mark.parametrize("name", ROUGH)
+@pytest.mark.parametrize("seed", range(3))
+def test_rough_settings_claim_no_more_than_they_reach(name, seed):
+    problem = random_problem(np.random.default_rng(seed), directions=4, limit=0.02)
+    solution = solve(problem, available(name), time_limit=1.0)
+    violation = problem.violations(solution.positions).max()
+    assert np.isfinite(violation)
+    assert solution.status != "solved" or violation <= ROUGH[name]
+
+
 @pytest.mark.parametrize("name", TO_OPTIMALITY)
 @pytest.mark.parametrize("seed", range(6))
 def test_solvers_of_the_projection_agree(name, seed):
@@ -110,9 +144,7 @@ def test_pins_stay_and_the_problem_is_not_changed(name):
     assert solution.positions[problem.pinned] == pytest.approx(before[problem.pinned], abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    "name", ["clarabel", "clarabel-default", "clarabel-paper", "cvxpy", "ipopt", "newton-ipm"]
-)
+@pytest.mark.parametrize("name", [*TO_OPTIMALITY, "clarabel-paper"])
 def test_multipliers_are_stationary(name):
     problem = random_problem(np.random.default_rng(9), directions=4, limit=0.05)
     solution = solve(problem, available(name))

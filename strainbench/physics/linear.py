@@ -55,7 +55,7 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def solve(self, b: FloatArray) -> FloatArray:
-        """A^-1 b (n,) for the matrix that was factorised last."""
+        """A^-1 b, (n,) or (n, k), for the matrix that was factorised last."""
 
 
 def symmetric(lower: sp.csc_array) -> sp.csc_array:
@@ -134,7 +134,7 @@ class Cholmod(LinearSolver):
         """See the base class."""
         x = self._cvxopt.matrix(b)
         self._cholmod.solve(self._factor, x)
-        return np.array(x).ravel()
+        return np.array(x).reshape(b.shape)
 
 
 class Pardiso(LinearSolver):
@@ -195,11 +195,11 @@ class Pardiso(LinearSolver):
 def _pardiso(
     matrix: tuple[Any, ...], phase: int, b: FloatArray | None = None
 ) -> tuple[FloatArray, int]:
-    """x and the error code of MKL's function: one matrix, one right-hand side, no output."""
+    """x and the error code of MKL's function: one matrix, any right-hand sides, no output."""
     function, memory, parameters, values, starts, indices = matrix
     n = len(starts) - 1
-    b = np.zeros(n) if b is None else np.ascontiguousarray(b, dtype=np.float64)
-    x, permutation, error = np.empty(n), np.zeros(1, dtype=np.int32), ctypes.c_int32(0)
+    b = np.zeros(n) if b is None else np.asfortranarray(b, dtype=np.float64)
+    x, permutation, error = np.empty_like(b), np.zeros(1, dtype=np.int32), ctypes.c_int32(0)
 
     def number(value: int) -> Any:
         return ctypes.byref(ctypes.c_int32(value))
@@ -210,7 +210,7 @@ def _pardiso(
     kind = 2  # real, symmetric positive definite
     function(
         *(array(memory), number(1), number(1), number(kind), number(phase), number(n)),
-        *(array(values), array(starts), array(indices), array(permutation), number(1)),
+        *(array(values), array(starts), array(indices), array(permutation), number(b.size // n)),
         *(array(parameters), number(0), array(b), array(x), ctypes.byref(error)),
     )
     return x, error.value
