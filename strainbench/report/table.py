@@ -94,14 +94,15 @@ def accuracy_text(row: pd.Series | None) -> str:
         return ""
     return " · ".join(
         (
-            _power(row["max_violation"]),
-            _power(row["relative_gap_max"]),
+            power(row["max_violation"]),
+            power(row["relative_gap_max"]),
             f"{1000 * row['distance_max']:.2g}",
         )
     )
 
 
-def _power(value: float) -> str:
+def power(value: float) -> str:
+    """One digit and a power of ten, as in 3e-9; 0 is 0."""
     return f"{value:.0e}".replace("e-0", "e-").replace("0e+00", "0").replace("e+00", "")
 
 
