@@ -25,8 +25,8 @@ from strainbench import __version__
 from strainbench.cell import Cell
 from strainbench.discovery import Entry, list_scenarios, list_solvers
 from strainbench.export import check_format, write_problem
-from strainbench.frame import record
-from strainbench.plan import plan, plan_one
+from strainbench.frame import record, recorder
+from strainbench.plan import plan, plan_one, plan_scene
 from strainbench.problem import Problem
 from strainbench.records import RecordsError
 from strainbench.reference import REFERENCE_SOLVER
@@ -41,6 +41,7 @@ app = typer.Typer(
 console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
 DEFAULT_PICTURES = Path("results/local/pictures")
+DEFAULT_CONVERGENCE = Path("results/local/convergence")
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
@@ -270,6 +271,37 @@ def export(
         markup=False,
         soft_wrap=True,
     )
+
+
+@app.command("converge")
+def converge_(
+    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    frame: Annotated[int, typer.Option(help="which projection, the first being 1")],
+    solver: Annotated[
+        list[str] | None,
+        typer.Option(help="name, comma-separated names, path of a .py file, or all (default)"),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="the tightest that solvers aim at")] = 1e-8,
+    time_limit: Annotated[float, typer.Option(help="seconds a solver, all its runs")] = 60.0,
+    results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_CONVERGENCE,
+) -> None:
+    """Follow solvers on one projection of a scene: violation, gap and distance against time."""
+    from strainbench.converge import converge  # pebble and the referee only where needed
+    from strainbench.report.convergence import write_convergence
+
+    cells = plan_scene(scenario, solver or ["all"], set_ or [], 1, tolerance, time_limit)
+    problem = _record(recorder(cells[0]), frame)
+    memory = 0.75 * psutil.virtual_memory().total / 1024**2
+    with _bar() as bar:
+        ended = converge(cells, problem, frame, results, memory)
+        for cell, ending in bar.track(ended, len(cells), description="solvers"):
+            bar.console.print(f"{cell.solver.label}: {ending}", highlight=False, markup=False)
+    for path in write_convergence(results):
+        console.print(f"wrote {path}", highlight=False)
 
 
 def _record(cell: Cell, frame: int) -> Problem:

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
-from strainbench.cell import Cell
+from strainbench.cell import Cell, PluginRef
+from strainbench.discovery import find_solver
 from strainbench.limits import FloatArray
 from strainbench.problem import Problem
+from strainbench.reference import REFERENCE_SOLVER
 from strainbench.solver import run_solver
+
+
+def recorder(cell: Cell) -> Cell:
+    """The same scene with the reference solver, which records what others are fed."""
+    reference = PluginRef.of(find_solver(REFERENCE_SOLVER))
+    return replace(cell, solver=reference, mode="simulate", tolerance=1e-6, time_limit=None)
 
 
 class _Reached(Exception):  # noqa: N818

@@ -161,7 +161,12 @@ def plan(
 
 
 def plan_scene(
-    scenario: str, solvers: str, settings: Sequence[str], steps: int, tolerance: float
+    scenario: str,
+    solvers: Sequence[str],
+    settings: Sequence[str],
+    steps: int,
+    tolerance: float,
+    time_limit: float | None = None,
 ) -> list[Cell]:
     """One scene with one set of values, and its solvers, from the words of a command line.
 
@@ -170,7 +175,7 @@ def plan_scene(
     ValueError
         One line: a wrong word, or several scenes.
     """
-    cells = plan([scenario], [solvers], settings, "simulate", steps, [tolerance], None)
+    cells = plan([scenario], solvers, settings, "simulate", steps, [tolerance], time_limit)
     scenes = {str(cell.scenario.identity) for cell in cells}
     if len(scenes) > 1:
         raise ValueError(
@@ -184,7 +189,7 @@ def plan_available(
     scenario: str, solvers: str, settings: Sequence[str], steps: int, tolerance: float
 ) -> list[Cell]:
     """The same; ValueError for an unavailable solver, with the reason."""
-    cells = plan_scene(scenario, solvers, settings, steps, tolerance)
+    cells = plan_scene(scenario, [solvers], settings, steps, tolerance)
     for cell in cells:
         if cell.solver.unavailable:
             raise ValueError(cell.solver.unavailable)

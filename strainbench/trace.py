@@ -1,0 +1,113 @@
+"""One solver on one frame, in a process of its own: its iterates, or its answers to ever tighter
+tolerances, written down with the seconds and iterations that they took.
+
+1. The solver runs at each tolerance from LOOSEST down, and its answers are kept.
+2. Once it shows iterates through `monitor`, these answers are dropped; it runs at the tightest
+   tolerance, and its iterates are kept, ever fewer of them, while the clock stands still.
+
+All runs together have the cell's time limit.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+
+from strainbench.cell import Cell
+from strainbench.export import load_problem
+from strainbench.limits import FloatArray
+from strainbench.play import Journal, Stop, wait_for_go, with_journal
+from strainbench.problem import Problem
+from strainbench.solver import Solution, Watch, run_solver, warm_up
+
+LOOSEST = 1e2
+"""For Clarabel, gaps of 1e-2 of its scaled objective: 10 of the 14 iterations that 1e-8 takes."""
+ALL = 20  # iterates are kept one by one up to this many,
+GROWTH = 1.1  # and from there on where their count has grown by this
+
+
+def trace(cell: Cell, folder: Path, frame: Path | None) -> None:
+    """Run `cell`'s solver on the exported problem at `frame`, writing to `folder`."""
+    assert frame is not None
+    problem = load_problem(frame)
+    with_journal(folder, lambda journal: _trace(cell, folder, journal, problem))
+
+
+def _trace(cell: Cell, folder: Path, journal: Journal, problem: Problem) -> None:
+    solver = cell.solver.solver()
+    if refusal := solver.supports(problem):
+        raise Stop(f"unsupported: {refusal}")
+    warm_up(solver, problem, cell.tolerance)
+    wait_for_go(folder, journal)
+    begin = time.perf_counter()
+    state = solver.prepare(problem)
+    journal.write("setup", seconds=time.perf_counter() - begin)
+
+    def run(tolerance: float, watch: Watch) -> Solution:
+        limit = cell.time_limit
+        remaining = None if limit is None else limit - (time.perf_counter() - begin)
+        if remaining is not None and remaining <= 0:
+            raise Stop(f"time limit of {limit:g} s")
+        return run_solver(solver, problem, state, tolerance, remaining, watch)
+
+    keeper = Keeper(journal, problem)
+    for tolerance in tolerances(cell.tolerance):  # 1
+        shown = Count()
+        solution = run(tolerance, shown.watch)
+        if shown.iterates:
+            break
+        keeper.answer(solution, tolerance)
+    else:
+        return
+    journal.write("iterative")
+    keeper.answer(run(cell.tolerance, keeper.watch), cell.tolerance)  # 2
+
+
+def tolerances(tightest: float) -> list[float]:
+    """LOOSEST and each tenth of it above `tightest`, and that."""
+    steps = int(np.ceil(np.log10(LOOSEST / tightest) - 1e-9))
+    return [*(LOOSEST / 10**k for k in range(steps)), tightest]
+
+
+class Count:
+    """A watch that counts."""
+
+    iterates = 0
+
+    def watch(self, *_: object) -> None:
+        """See `strainbench.solver.Watch`."""
+        self.iterates += 1
+
+
+class Keeper:
+    """Writes iterates and answers down."""
+
+    def __init__(self, journal: Journal, problem: Problem) -> None:
+        self._journal, self._target = journal, problem.target
+        self._next = 0.0
+
+    def watch(
+        self, seconds: float, iterations: int, positions: FloatArray, _: FloatArray | None
+    ) -> None:
+        """See `strainbench.solver.Watch`."""
+        if iterations >= self._next:
+            self._next = iterations + 1 if iterations < ALL else GROWTH * iterations
+            self._write(positions, seconds=seconds, iterations=int(iterations), status="")
+
+    def answer(self, solution: Solution, tolerance: float) -> None:
+        """A finished run's."""
+        self._write(
+            solution.positions,
+            seconds=solution.seconds,
+            iterations=int(solution.iterations),
+            status=str(solution.status),
+            tolerance=tolerance,
+        )
+
+    def _write(self, positions: FloatArray, **facts: object) -> None:
+        usable = np.shape(positions) == self._target.shape
+        kept = np.asarray(positions, float) if usable else np.full_like(self._target, np.nan)
+        self._journal.frame(self._target, kept)
+        self._journal.write("sample", **facts)
