@@ -5,8 +5,13 @@ With the free vertices' displacements u = x - target as unknowns,
     minimise 1/2 u'Pu  such that  A u + s = b,  each block of s in one and the same cone,
 
 where P = s M. This is Tang et al. 2022, Eq. 12, but for the objective, which is given as a
-quadratic, without a cone of its own. Constraint i has the second-order cone of order 4,
-(b_i, (G x)_i) in Q^4.
+quadratic, without a cone of its own. A constraint's block of s is
+
+- (b_i, (G x)_i) in the second-order cone of order 4, or
+- with exact limits, the matrix [[b I, Y], [Y^T, b I]], positive semidefinite iff ||Y||_2 <= b,
+  where Y (3 x dim) has the element's rows of G x as its columns. A block holds one triangle of
+  it, column after column, off-diagonal entries times sqrt(2), so that products of blocks are
+  those of matrices: the upper triangle as Clarabel wants it, or the lower one as SCS does.
 """
 
 from __future__ import annotations
@@ -24,26 +29,57 @@ class ConicForm:
     Parameters
     ----------
     problem : any frame of the mesh.
-    scaling : factor s of the objective in units of 1/edge^2; None leaves it in the problem's.
+    scaling : factor s of the objective in units of 1/edge^2 over the mean weight; None is s = 1.
+    triangle : "upper" or "lower", of semidefinite cones.
 
     Attributes
     ----------
     P : (u, u) diagonal, u = 3 times the free vertices, in the order of (free vertices, 3)
     A : (length count, u)
-    cone, length, count : "second-order"; entries of s in one cone; how many cones
+    cone, order : "second-order" and 4, or "semidefinite" and 3 + dim, the matrices' order
+    length, count : entries of s in one cone; how many cones
     scale : s
     """
 
-    def __init__(self, problem: Problem, scaling: float | None = None) -> None:
-        self.scale = 1.0 if scaling is None else scaling / problem.edge_length**2
+    def __init__(
+        self, problem: Problem, scaling: float | None = None, triangle: str = "upper"
+    ) -> None:
+        unit = problem.edge_length**2 * float(problem.weights.mean())
+        self.scale = 1.0 if scaling is None else scaling / unit
         weights = np.repeat(problem.weights[problem.free], 3)
         self.P = sp.csc_array(sp.diags_array(self.scale * weights))
-        self.cone, self.length, self.count = "second-order", 4, problem.rows
-        self.A = -sp.csc_array(sp.kron(problem.G[:, problem.free], sp.eye_array(4, 3, k=-1)))
+        self.count = problem.constraints
+        if problem.limits.spectral:
+            self.cone, self.order = "semidefinite", 3 + problem.rows // problem.constraints
+            self.length, self._factor = self.order * (self.order + 1) // 2, np.sqrt(2)
+            entry = np.zeros((self.order, self.order), dtype=np.int64)
+            corner = np.tril_indices(self.order)  # row by row: the upper one column by column
+            if triangle == "lower":
+                corner = np.triu_indices(self.order)
+            entry[corner] = np.arange(self.length)
+            entry = np.maximum(entry, entry.T)
+            self._bound_entries, rows = np.diag(entry), entry[3:, :3]
+        else:
+            self.cone, self.order, self.length, self._factor = "second-order", 4, 4, 1.0
+            self._bound_entries, rows = np.array([0]), np.array([[1, 2, 3]])
+        blocks = self.length * np.arange(self.count)[:, None, None]
+        self._entries = (blocks + rows).reshape(-1, 3)
+        pick = sp.csc_array(
+            (
+                np.full(3 * problem.rows, -self._factor),
+                (self._entries.ravel(), range(3 * problem.rows)),
+            ),
+            shape=(self.length * self.count, 3 * problem.rows),
+        )
+        self.A = sp.csc_array(pick @ sp.kron(problem.G[:, problem.free], sp.eye_array(3)))
 
     def constants(self, problem: Problem) -> FloatArray:
-        """The vector b of a frame: (b_i, (G target)_i) for each constraint."""
-        return np.column_stack([problem.bounds, problem.G @ problem.target]).ravel()
+        """The vector b of a frame: the bounds and G target, where s holds b_i and (G x)_i."""
+        blocks = np.zeros((self.count, self.length))
+        blocks[:, self._bound_entries] = problem.bounds[:, None]
+        constants = blocks.ravel()
+        constants[self._entries] = self._factor * (problem.G @ problem.target)
+        return constants
 
     def positions(self, problem: Problem, u: FloatArray) -> FloatArray:
         """(n, 3) target plus displacement [m]."""
@@ -53,4 +89,5 @@ class ConicForm:
 
     def multipliers(self, duals: FloatArray) -> FloatArray:
         """(rows, 3) Y from the duals of A u + s = b, in the problem's own units."""
-        return -duals.reshape(-1, 4)[:, 1:] / self.scale
+        multipliers: FloatArray = -self._factor * duals[self._entries] / self.scale
+        return multipliers

@@ -52,7 +52,7 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def solve(self, b: FloatArray) -> FloatArray:
-        """A^-1 b (n,) for the matrix that was factorised last."""
+        """A^-1 b, (n,) or (n, k), for the matrix that was factorised last."""
 
 
 def symmetric(lower: sp.csc_array) -> sp.csc_array:
@@ -131,7 +131,7 @@ class Cholmod(LinearSolver):
         """See the base class."""
         x = self._cvxopt.matrix(b)
         self._cholmod.solve(self._factor, x)
-        return np.array(x).ravel()
+        return np.array(x).reshape(b.shape)
 
 
 def available_linear_solvers() -> list[type[LinearSolver]]:
