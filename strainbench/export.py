@@ -6,14 +6,16 @@ The arrays of an npz: n vertices, e elements, m limited directions, r = e m rows
 |---|---|---|
 | rest, elements, target, pinned, mass | | those of `Problem`; no mass where the norm has none |
 | limit_directions, limit_bounds, limit_spectral | (m, dim), (m,) or (e, m) | `StretchLimits` |
-| G_*, bounds | (r, n), (c,) | ||(G x)_i|| <= b_i |
+| G_*, bounds | (r, n), (c,) | ||(G x)_i|| <= b_i; with exact limits see `Problem` |
 | free | (f,) | vertices that are not pinned |
 | P_*, q, A_*, b | | minimise 1/2 u'Pu + q'u such that A u + s = b, s in the cones |
-| cone, cone_length, cone_count | | what each block of s is in, its entries, how many blocks |
+| cone, cone_order, cone_length, cone_count | | what a block of s is in, its order and entries |
 
-A matrix is four arrays, as scipy has them: `X_data`, `X_indices`, `X_indptr`, `X_shape`. The
-unknowns u are the displacements from the target of the free vertices, (f, 3) in C order, in
-metres; the objective is that of the problem. `load_problem` reads an npz back.
+A matrix is four arrays, as scipy has compressed rows: `X_data`, `X_indices`, `X_indptr`,
+`X_shape`. The unknowns u are the displacements from the target of the free vertices, (f, 3) in C
+order, in metres; the objective is that of the problem. s has `cone_count` blocks of `cone_length`
+entries, each in one "second-order" cone, or in one "semidefinite": matrices of `cone_order` as
+`strainbench.conic` lays them out. `load_problem` reads an npz back.
 """
 
 from __future__ import annotations
@@ -65,20 +67,23 @@ def write_problem(problem: Problem, path: Path, kind: str, about: str) -> None:
 
 def as_cbf(problem: Problem, about: str) -> bytes:
     """The cone program in the Conic Benchmark Format; see `strainbench.cbf`."""
-    if problem.limits.spectral:
-        raise ValueError("--format cbf has second-order cones alone; npz takes exact limits")
     form = ConicForm(problem)
     comments = [
         about,
-        "minimise t = 1/2 ||x - target||_M^2 such that ||(G x)_i|| <= b_i",
+        f"minimise t = 1/2 ||x - target||_M^2 such that {_limits(problem)}",
         f"variables 0 to {form.P.shape[0] - 1}: x - target [m] of the free vertices, three each",
         f"variable {form.P.shape[0]}: t",
     ]
     return cbf_text(form, form.constants(problem), comments).encode()
 
 
+def _limits(problem: Problem) -> str:
+    return "||F_e D||_2 <= b_e" if problem.limits.spectral else "||(G x)_i|| <= b_i"
+
+
 def as_npz(problem: Problem, about: str) -> bytes:
     """All arrays of the problem and of its cone program."""
+    form = ConicForm(problem)
     arrays: dict[str, object] = {
         "about": about,
         "rest": problem.rest,
@@ -92,25 +97,19 @@ def as_npz(problem: Problem, about: str) -> bytes:
         "bounds": problem.bounds,
         "free": problem.free,
         **_sparse("G", problem.G),
-        **({} if problem.limits.spectral else _cone_program(problem)),
-    }
-    buffer = BytesIO()
-    plain: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
-    np.savez_compressed(buffer, **plain)
-    return buffer.getvalue()
-
-
-def _cone_program(problem: Problem) -> dict[str, object]:
-    form = ConicForm(problem)
-    return {
         **_sparse("P", form.P),
         "q": np.zeros(form.P.shape[0]),
         **_sparse("A", form.A),
         "b": form.constants(problem),
         "cone": form.cone,
+        "cone_order": form.order,
         "cone_length": form.length,
         "cone_count": form.count,
     }
+    buffer = BytesIO()
+    plain: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
+    np.savez_compressed(buffer, **plain)
+    return buffer.getvalue()
 
 
 FORMATS = {"cbf": as_cbf, "npz": as_npz}

@@ -41,12 +41,18 @@ def read_cbf(path):
     blocks, cones = [], []
     for kind, n in domains:
         T = np.eye(n)
+        cone = clarabel.SecondOrderConeT(n)
         if kind == mosek.domaintype.rquadratic_cone:  # 2 s t >= |v|^2
             T[:2, :2] = np.array([[1, 1], [1, -1]]) / np.sqrt(2)
+        elif kind == mosek.domaintype.svec_psd_cone:  # lower triangles by column: upper ones
+            order = round((np.sqrt(8 * n + 1) - 1) / 2)
+            i, j = np.triu_indices(order)  # by row
+            T = T[np.lexsort((i, j))]
+            cone = clarabel.PSDTriangleConeT(order)
         else:
             assert kind == mosek.domaintype.quadratic_cone
         blocks.append(sp.csc_array(T))
-        cones.append(clarabel.SecondOrderConeT(n))
+        cones.append(cone)
     T = sp.block_diag(blocks, format="csc")
     F = sp.csc_array((values, (rows, columns)), shape=size)
     return c, -(T @ F), T @ constants, cones
@@ -68,9 +74,25 @@ def scale_of(problem):
     return 100 / (problem.edge_length**2 * float(problem.weights.mean()))
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_cbf_has_the_optimum_of_solve(seed, swing, tmp_path):
-    problem = random_problem(np.random.default_rng(seed), directions=4) if seed else swing
+def exact(problem, *bounds):
+    """The same problem with an exact limit."""
+    limits = StretchLimits.exact(*bounds)
+    return Problem(
+        problem.rest, problem.elements, problem.target, limits, problem.pinned, problem.mass
+    )
+
+
+def cases(swing):
+    """Sampled and exact limits, with pins and masses and without."""
+    rng = np.random.default_rng(0)
+    draws = [random_problem(rng, directions=4) for _ in range(3)]
+    small = random_problem(rng, vertices=16, limit=0.05)
+    return [swing, *draws, exact(small, 1.03), exact(small, 1.02, 1.3)]
+
+
+@pytest.mark.parametrize("case", range(6))
+def test_cbf_has_the_optimum_of_solve(case, swing, tmp_path):
+    problem = cases(swing)[case]
     write_problem(problem, tmp_path / "frame.cbf", "cbf", "a test")
     value, z = optimum(*read_cbf(tmp_path / "frame.cbf"), scale_of(problem))
     solution = solve(problem, "clarabel-tight", tolerance=1e-7)
@@ -91,38 +113,42 @@ def test_npz_is_the_same_problem(seed, tmp_path):
     assert np.array_equal(solve(again, "gauss-seidel").positions, same)
 
 
-def test_npz_of_seams_and_of_exact_limits(tmp_path):
-    flat = random_problem(np.random.default_rng(1), directions=4)
-    rest = flat.rest[flat.elements]
-    for limits in (flat.limits, StretchLimits.exact(1.02, 1.1)):
-        problem = Problem(rest, flat.elements, flat.target, limits, flat.pinned, flat.mass)
+def test_npz_of_seams_and_of_exact_limits(rng, tmp_path):
+    flat = random_problem(rng, directions=4)
+    sewn = Problem(
+        flat.rest[flat.elements], flat.elements, flat.target, flat.limits, flat.pinned, flat.mass
+    )
+    for problem in (sewn, exact(sewn, 1.02, 1.1)):
         write_problem(problem, tmp_path / "frame.npz", "npz", "a test")
         again = load_problem(tmp_path / "frame.npz")
         assert content_key(again) == content_key(problem)
         assert again.limits.spectral == problem.limits.spectral
 
 
-def test_npz_has_constraints_and_cone_program_in_plain_arrays(swing, tmp_path):
+@pytest.mark.parametrize("case", [0, 1, 4])
+def test_npz_has_the_cone_program_in_plain_arrays(case, swing, tmp_path):
+    problem = cases(swing)[case]
     path = tmp_path / "frame.npz"
-    path.write_bytes(as_npz(swing, "a test"))
+    path.write_bytes(as_npz(problem, "a test"))
     with np.load(path, allow_pickle=False) as data:
         d = dict(data)
     G, P, A = (
         sp.csr_array((d[f"{n}_data"], d[f"{n}_indices"], d[f"{n}_indptr"]), d[f"{n}_shape"])
         for n in "GPA"
     )
-    stretches = np.linalg.norm(G @ d["target"], axis=1)
-    assert stretches == pytest.approx(swing.stretches(swing.target))
-    assert d["bounds"] == pytest.approx(swing.bounds)
-    assert str(d["cone"]) == "second-order"
-    cones = [clarabel.SecondOrderConeT(int(d["cone_length"]))] * int(d["cone_count"])
-    value, u = optimum(d["q"], A, d["b"], cones, scale_of(swing), P)
+    assert np.array_equal(G.toarray(), problem.G.toarray())
+    assert np.array_equal(d["bounds"], problem.bounds)
+    kind = {
+        "second-order": clarabel.SecondOrderConeT,
+        "semidefinite": clarabel.PSDTriangleConeT,
+    }[str(d["cone"])]
+    cones = [kind(int(d["cone_order"]))] * int(d["cone_count"])
+    value, u = optimum(d["q"], A, d["b"], cones, scale_of(problem), P)
     x = d["target"].copy()
     x[d["free"]] += u.reshape(-1, 3)
-    assert value == pytest.approx(swing.objective(x), rel=1e-6)
-    assert value == pytest.approx(
-        swing.objective(solve(swing, "clarabel-tight", tolerance=1e-7).positions), rel=1e-6
-    )
+    assert value == pytest.approx(problem.objective(x), rel=1e-6)
+    answer = solve(problem, "clarabel-tight", tolerance=1e-7)
+    assert value == pytest.approx(problem.objective(answer.positions), rel=1e-6)
 
 
 def test_a_frame_is_the_kth_candidate():
