@@ -171,7 +171,7 @@ def samples(frame: Frame, cell: Cell, item: Running | None) -> Rows:
     by_name = {e["event"]: e for e in events}
     same = {
         "solver": cell.solver.label,
-        "sampled_by": "iterates" if "iterative" in by_name else "tolerances",
+        "sampled_by": "iterates" if "iterate" in by_name else "tolerances",
         "setup_seconds": by_name.get("setup", {}).get("seconds", ""),
         "ending": _ending(cell, item, by_name),
         "time_limit": "" if cell.time_limit is None else cell.time_limit,
@@ -180,14 +180,14 @@ def samples(frame: Frame, cell: Cell, item: Running | None) -> Rows:
 
 
 def _measured(frame: Frame, item: Running, events: list[dict[str, Any]]) -> Rows:
-    """The samples, of iterates alone where there are any; one that says nothing without any."""
-    names = [e["event"] for e in events if e["event"] in ("sample", "iterative")]
-    first = names.index("iterative") if "iterative" in names else 0
-    kept = [e for e in events if e["event"] == "sample"]
-    answers = [positions for _, positions in read_frames(item.folder, len(kept))]
+    """All answers, or the last run's iterates and answer; one that says nothing without any."""
+    kept = [e for e in events if e["event"] in ("iterate", "answer")]
+    runs = [e["tolerance"] for e in kept if e["event"] == "iterate"]
+    answers = read_frames(item.folder, len(kept))
     rows: Rows = [
         {k: v for k, v in event.items() if k in COLUMNS} | frame.measures(positions)
-        for event, positions in zip(kept[first:], answers[first:], strict=True)
+        for event, (_, positions) in zip(kept, answers, strict=True)
+        if not runs or event["tolerance"] == runs[-1]
     ]
     return rows or [{}]
 
@@ -197,5 +197,5 @@ def _ending(cell: Cell, item: Running | None, events: dict[str, dict[str, Any]])
     if item is None:
         return f"unavailable: {cell.solver.unavailable}"
     failure = item.ending or events.get("failed", {}).get("reason")
-    status = events.get("sample", {}).get("status")
+    status = events.get("answer", {}).get("status")
     return failure or (f"it says {status!r}" if status else "the process ended without a word")

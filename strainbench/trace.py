@@ -1,9 +1,9 @@
 """One solver on one frame, in a process of its own: its iterates, or its answers to ever tighter
 tolerances, written down with the seconds and iterations that they took.
 
-1. The solver runs at each tolerance from LOOSEST down, and its answers are kept.
-2. Once it shows iterates through `monitor`, these answers are dropped; it runs at the tightest
-   tolerance, and its iterates are kept, ever fewer of them, while the clock stands still.
+1. The solver runs at each tolerance from LOOSEST down. Its answers are kept, and so are the
+   iterates that it shows through `monitor`, ever fewer of them, while the clock stands still.
+2. Once a run has shown iterates, the next one is at the tightest tolerance, and the last.
 
 All runs together have the cell's time limit.
 """
@@ -52,17 +52,13 @@ def _trace(cell: Cell, folder: Path, journal: Journal, problem: Problem) -> None
             raise Stop(f"time limit of {limit:g} s")
         return run_solver(solver, problem, state, tolerance, remaining, watch)
 
-    keeper = Keeper(journal, problem)
-    for tolerance in tolerances(cell.tolerance):  # 1
-        shown = Count()
-        solution = run(tolerance, shown.watch)
-        if shown.iterates:
-            break
-        keeper.answer(solution, tolerance)
-    else:
-        return
-    journal.write("iterative")
-    keeper.answer(run(cell.tolerance, keeper.watch), cell.tolerance)  # 2
+    looser = tolerances(cell.tolerance)
+    while looser:
+        tolerance = looser.pop(0)
+        keeper = Keeper(journal, problem, tolerance)
+        keeper.answer(run(tolerance, keeper.watch))  # 1
+        if keeper.has_iterates:
+            del looser[:-1]  # 2
 
 
 def tolerances(tightest: float) -> list[float]:
@@ -71,43 +67,38 @@ def tolerances(tightest: float) -> list[float]:
     return [*(LOOSEST / 10**k for k in range(steps)), tightest]
 
 
-class Count:
-    """A watch that counts."""
-
-    iterates = 0
-
-    def watch(self, *_: object) -> None:
-        """See `strainbench.solver.Watch`."""
-        self.iterates += 1
-
-
 class Keeper:
-    """Writes iterates and answers down."""
+    """Writes the iterates and the answer of one run down."""
 
-    def __init__(self, journal: Journal, problem: Problem) -> None:
-        self._journal, self._target = journal, problem.target
+    def __init__(self, journal: Journal, problem: Problem, tolerance: float) -> None:
+        self._journal, self._target, self._tolerance = journal, problem.target, tolerance
         self._next = 0.0
+        self.has_iterates = False
 
     def watch(
         self, seconds: float, iterations: int, positions: FloatArray, _: FloatArray | None
     ) -> None:
         """See `strainbench.solver.Watch`."""
+        self.has_iterates = True
         if iterations >= self._next:
             self._next = iterations + 1 if iterations < ALL else GROWTH * iterations
-            self._write(positions, seconds=seconds, iterations=int(iterations), status="")
+            self._write("iterate", seconds, iterations, positions, "")
 
-    def answer(self, solution: Solution, tolerance: float) -> None:
-        """A finished run's."""
-        self._write(
-            solution.positions,
-            seconds=solution.seconds,
-            iterations=int(solution.iterations),
-            status=str(solution.status),
-            tolerance=tolerance,
-        )
+    def answer(self, solution: Solution) -> None:
+        """What the run came back with."""
+        s = solution
+        self._write("answer", s.seconds, s.iterations, s.positions, str(s.status))
 
-    def _write(self, positions: FloatArray, **facts: object) -> None:
+    def _write(
+        self, event: str, seconds: float, iterations: int, positions: FloatArray, status: str
+    ) -> None:
         usable = np.shape(positions) == self._target.shape
         kept = np.asarray(positions, float) if usable else np.full_like(self._target, np.nan)
         self._journal.frame(self._target, kept)
-        self._journal.write("sample", **facts)
+        self._journal.write(
+            event,
+            tolerance=self._tolerance,
+            seconds=seconds,
+            iterations=int(iterations),
+            status=status,
+        )
