@@ -109,7 +109,7 @@ class GaussSeidel(Solver):
             sweeps = min(mark - done, chunk, self.max_sweeps - done)
             done += state.sweep(b, x, tolerance, sweeps)
             if done == mark:
-                monitor(x.copy())
+                monitor(x, iterations=done)
                 mark *= 2
         return Solution(x, "solved", done)
 

@@ -243,5 +243,5 @@ class Callbacks:
     def intermediate(self, algorithm: int, iteration: int, *progress: float) -> bool:
         """Whether to go on; called once an iteration."""
         self.iterations = iteration
-        self.monitor(self.positions(self.iterate))
+        self.monitor(self.positions(self.iterate), iterations=iteration)
         return not self.deadline.passed

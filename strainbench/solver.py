@@ -15,8 +15,9 @@ from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import square_grid
 from strainbench.problem import Problem
 
-Watch = Callable[[float, FloatArray, FloatArray | None], None]
-"""Called with the seconds spent, the positions (n, 3) and perhaps the multipliers (rows, 3)."""
+Watch = Callable[[float, int, FloatArray, FloatArray | None], None]
+"""Called with seconds and iterations so far, the positions (n, 3) and perhaps the multipliers
+(rows, 3); the arrays are the solver's own, and change after the call."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Clock:
     def __init__(self, time_limit: float | None = None, watch: Watch | None = None) -> None:
         self._limit = float("inf") if time_limit is None else time_limit
         self._watch = watch
+        self._iterations = 0
         self._paused = 0.0
         self._start = perf_counter()
 
@@ -67,12 +69,24 @@ class Clock:
         """Whether the deadline has passed: a solver then returns what it has."""
         return self.remaining <= 0
 
-    def monitor(self, positions: FloatArray, multipliers: FloatArray | None = None) -> None:
-        """Show an iterate to whoever watches, off the clock."""
+    def monitor(
+        self,
+        positions: FloatArray,
+        multipliers: FloatArray | None = None,
+        iterations: int | None = None,
+    ) -> None:
+        """Show an iterate to whoever watches, off the clock.
+
+        Parameters
+        ----------
+        iterations : done so far, where the solver does not show the iterate of each.
+        """
         if self._watch is None:
             return
         start = perf_counter()
-        self._watch(start - self._start - self._paused, positions, multipliers)
+        self._iterations = self._iterations + 1 if iterations is None else iterations
+        seconds = start - self._start - self._paused
+        self._watch(seconds, self._iterations, positions, multipliers)
         self._paused += perf_counter() - start
 
 
@@ -116,8 +130,9 @@ class Solver(ABC):
     ) -> Solution:
         """Project, aiming for a max violation and a relative gap below `tolerance`.
 
-        `monitor(positions)` shows an iterate, off the clock; `deadline.passed` says when to
-        stop and `deadline.remaining` how many seconds are left. The problem is read-only.
+        `monitor(positions)` shows an iterate, off the clock, with `iterations=k` if not each is
+        shown; `deadline.passed` says when to stop and `deadline.remaining` how many seconds are
+        left. The problem is read-only.
         """
 
     @property

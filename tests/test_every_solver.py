@@ -152,3 +152,21 @@ def test_multipliers_are_stationary(name):
     assert solution.multipliers is not None
     back = (problem.G.T @ solution.multipliers)[problem.free]
     assert np.abs(back - force).max() < 1e-2 * np.abs(force).max()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_iterates_are_shown_with_the_iterations_that_they_took(name):
+    """Those of a whole number of iterations, rising, the last one at most half of them back."""
+    problem = random_problem(np.random.default_rng(11), directions=4, limit=0.02)
+    shown = []
+
+    def watch(seconds, iterations, positions, multipliers):
+        assert np.shape(positions) == problem.target.shape
+        shown.append((iterations, seconds))
+
+    solution = solve(problem, available(name), watch=watch)
+    counts, seconds = zip(*shown, strict=True) if shown else ((), ())
+    assert list(counts) == sorted(set(counts))
+    assert list(seconds) == sorted(seconds)
+    if shown:
+        assert counts[-1] <= solution.iterations <= 2 * counts[-1] + 1

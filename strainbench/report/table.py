@@ -94,14 +94,15 @@ def accuracy_text(row: pd.Series | None) -> str:
         return ""
     return " · ".join(
         (
-            _power(row["max_violation"]),
-            _power(row["relative_gap_max"]),
+            power(row["max_violation"]),
+            power(row["relative_gap_max"]),
             f"{1000 * row['distance_max']:.2g}",
         )
     )
 
 
-def _power(value: float) -> str:
+def power(value: float) -> str:
+    """One digit and a power of ten, as in 3e-9; 0 is 0."""
     return f"{value:.0e}".replace("e-0", "e-").replace("0e+00", "0").replace("e+00", "")
 
 
@@ -175,7 +176,7 @@ def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
     if lines := [f"- {line}" for line in details(runs)]:
         parts.append("## Inside the solve, means\n\n" + "\n".join(lines))
     parts.append(_ledger_markdown(runs))
-    parts.append("## Machine\n\n" + "\n".join(_machine_line(n, f) for n, f in machines.items()))
+    parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
     return "\n\n".join(parts) + "\n"
 
 
@@ -200,7 +201,8 @@ def _line(cells: list[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _machine_line(name: str, facts: Mapping[str, object]) -> str:
+def machine_line(name: str, facts: Mapping[str, object]) -> str:
+    """A machine and its facts in one line."""
     packages = facts.get("packages")
     versions = packages.items() if isinstance(packages, Mapping) else ()
     return (
