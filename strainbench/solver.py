@@ -97,17 +97,21 @@ class Solver(ABC):
     The first line of the docstring reads "method (paper)"; `strainbench list` shows both.
     `name` is lower case with hyphens. `variants` names other settings worth showing beside the
     defaults: {"default": {"scaling": "default"}} adds the solver `<name>-default`.
-    `takes_exact` says that the method has a form for exact limits.
+    `takes_exact` says that the method has a form for exact limits, `takes_lower` that it has one
+    for lower bounds, which are not convex.
     """
 
     name: ClassVar[str]
     variants: ClassVar[Mapping[str, Mapping[str, object]]] = {}
     takes_exact: ClassVar[bool] = False
+    takes_lower: ClassVar[bool] = False
 
     def supports(self, problem: Problem) -> str | None:
         """None, or the reason why this method cannot take the problem."""
         if problem.limits.spectral and not self.takes_exact:
             return "it has no form for exact limits, only for sampled directions"
+        if not (problem.convex or self.takes_lower):
+            return "it has no form for lower bounds, which are not convex"
         return None
 
     def missing(self) -> str | None:
@@ -186,12 +190,14 @@ def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
     if problem.rest.shape[-1] != 2:
         return
     rest, elements = square_grid(2, 1.0, "uniform")
-    bounds = np.atleast_2d(problem.limits.bounds)[0]
+    limits = problem.limits
+    bounds = np.atleast_2d(limits.bounds)[0]
+    lower = None if limits.lower is None else np.atleast_2d(limits.lower)[0]
     toy = Problem(
         rest=rest,
         elements=elements,
         target=np.column_stack([2 * bounds.max() * rest, 0.1 * rest[:, 0]]),
-        limits=StretchLimits(problem.limits.directions, bounds, problem.limits.spectral),
+        limits=StretchLimits(limits.directions, bounds, limits.spectral, lower),
         pinned=np.array([0]) if len(problem.pinned) else np.array([], dtype=np.int64),
         mass=None if problem.mass is None else np.linspace(1.0, 2.0, len(rest)),
     )

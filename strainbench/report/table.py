@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 GROUP = ["scenario", "mode", "setting", "tolerance", "steps_asked"]
@@ -19,6 +20,10 @@ what the referee found, at its worst over all steps: largest violation, relative
 certified lower bound, largest distance of a vertex from the reference optimum in mm, itself
 certified to within {error:.1g} mm. **Bold**:
 optimal on every step (violation at most {violation}, relative gap at most {gap})."""
+LOCAL = """
+*Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
+What such an answer is worth stands below: whether it is a local optimum, by the residual of the
+KKT conditions, and its objective beside the best known."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +97,8 @@ def accuracy_text(row: pd.Series | None) -> str:
     """Violation, relative gap, distance in mm."""
     if row is None or pd.isna(row["max_violation"]):
         return ""
+    if pd.isna(row["relative_gap_max"]):
+        return f"{_power(row['max_violation'])} · local"
     return " · ".join(
         (
             power(row["max_violation"]),
@@ -122,11 +129,12 @@ def tidy(runs: pd.DataFrame) -> pd.DataFrame:
 def explanation(runs: pd.DataFrame) -> str:
     """What the signs of a table mean."""
     thresholds = runs.iloc[0]
+    local = runs["max_violation"].notna() & runs["relative_gap_max"].isna()
     return EXPLANATION.format(
         violation=thresholds["violation_threshold"],
         gap=thresholds["gap_threshold"],
-        error=1000 * runs["reference_error_max"].max(),
-    )
+        error=1000 * np.nan_to_num(runs["reference_error_max"].max()),
+    ) + (LOCAL if local.any() else "")
 
 
 def reasons(runs: pd.DataFrame) -> list[str]:
