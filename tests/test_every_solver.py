@@ -11,9 +11,17 @@ from strainbench.discovery import UnavailableError, find_solver, list_solvers
 from tests.problems import random_problem
 
 NAMES = [e.name for e in list_solvers() if not e.unavailable]
-TO_OPTIMALITY = ["clarabel", "clarabel-default", "cvxpy", "dykstra", "dykstra-plain", "ipopt"]
+TO_OPTIMALITY = [
+    "augmented-lagrangian",
+    "clarabel",
+    "clarabel-default",
+    "cvxpy",
+    "dykstra",
+    "dykstra-plain",
+    "ipopt",
+]
 """Solvers of the projection itself; the others stop at a point within the limits."""
-FIXED_COUNT = ["xpbd-20", "xpbd-compliant"]
+FIXED_COUNT = ["augmented-lagrangian-arcsim", "xpbd-20", "xpbd-compliant"]
 """Variants as they are used elsewhere: so many iterations, wherever these end."""
 UNSCALED = ["clarabel-default", "clarabel-paper", "ipopt-default"]
 """Out of the box: an objective known to 1e-8 of its size leaves positions uncertain by 1e-4."""
