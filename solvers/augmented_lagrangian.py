@@ -38,6 +38,9 @@ from strainbench.reference import objective_floor
 DECREASE, HALVINGS = 1e-4, 20
 """Armijo's condition with its customary factor (Nocedal and Wright 2006, Sec. 3.1)."""
 
+CG_STEPS = 1000
+"""To a Newton step, at most; the tuning needed 20 to 100."""
+
 ENOUGH = 0.05
 """Part of the gap allowed that an inexact minimum may use up."""
 
@@ -80,9 +83,8 @@ class AugmentedLagrangian(Solver):
     | iteration limit | they are not, after `max_updates` of the multipliers |
     | time limit | they are not, at the deadline |
 
-    The variant "arcsim" has ARCSim's fixed counts, 10 iterations of conjugate gradients to an
-    update and 100 in all, and its fixed penalty. (Theirs are nonlinear ones, on the objective
-    itself; linear ones, preconditioned, get further.) Nothing in it looks at the limits.
+    The variant "arcsim" has ARCSim's fixed penalty, nonlinear conjugate gradients inside, and
+    fixed counts: 10 of their steps to an update, 100 in all, wherever these end.
 
     Parameters
     ----------
@@ -90,29 +92,32 @@ class AugmentedLagrangian(Solver):
         cells, 1% and 0.1%: from ARCSim's 1e3 up to 2e4 takes 0.5 to 1 times the time of any
         fixed mu from 1e3 to 1e5, and below 300 some never end. L-BFGS inside, with 5 to 20
         pairs, took 2 to 3 times as long as Newton-CG.
-    newton_steps : to an update, at most.
-    cg_steps : to a Newton step, at most.
+    inner : "newton" for step 2, or "cg" for nonlinear conjugate gradients, with beta =
+        max(0, min(Hestenes-Stiefel, Dai-Yuan)) and the step length of one Newton step along p.
+    inner_steps : to an update, at most.
     max_updates : of the multipliers; ten times what the tuning needed.
     """
 
     name = "augmented-lagrangian"
-    variants = {
-        "arcsim": {"max_penalty": 1e3, "newton_steps": 1, "cg_steps": 10, "max_updates": 10}
-    }
+    variants = {"arcsim": {"max_penalty": 1e3, "inner": "cg", "inner_steps": 10, "max_updates": 10}}
     takes_exact = True
 
     penalty: float = 1e3
     max_penalty: float = 2e4
-    newton_steps: int = 200
-    cg_steps: int = 1000
+    inner: str = "newton"
+    inner_steps: int = 200
     max_updates: int = 1000
+
+    def __post_init__(self) -> None:
+        if self.inner not in ("newton", "cg"):
+            raise ValueError(f"inner is {self.inner!r}: valid are newton, cg")
 
     def prepare(self, problem: Problem) -> Blocks:
         """Coefficients, and the compiled loops."""
         G = blocks(problem)
         shape = (problem.constraints, len(G.axes), 3)
-        newton = Newton(G, problem, np.zeros(shape), self.penalty, problem.target)
-        newton.step(0)
+        inner = Minimum(G, problem, np.zeros(shape), self.penalty, problem.target)
+        inner.newton_step(0)
         return G
 
     def solve(
@@ -124,7 +129,7 @@ class AugmentedLagrangian(Solver):
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """Updates from the target and Y = 0; the monitor sees Newton steps 1, 2, 4, 8, ..."""
+        """Updates from the target and Y = 0; the monitor sees inner steps 1, 2, 4, 8, ..."""
         Y = np.zeros((problem.rows, 3))
         return self.update(problem, state, problem.target, Y, tolerance, monitor, deadline)
 
@@ -153,21 +158,22 @@ class AugmentedLagrangian(Solver):
             if violation > 0.5 * last:
                 penalty = min(2 * penalty, self.max_penalty) if updates > 1 else penalty
             last = violation
-            newton = Newton(G, problem, Y, penalty, x)
-            for number in range(self.newton_steps):
-                close = newton.residual <= max(newton.moved, ENOUGH * allowed)
-                if (number and close) or newton.residual == 0 or deadline.passed:  # 3
+            minimum = Minimum(G, problem, Y, penalty, x)
+            step = minimum.newton_step if self.inner == "newton" else minimum.cg_step
+            for number in range(self.inner_steps):
+                close = minimum.residual <= max(minimum.moved, ENOUGH * allowed)
+                if (number and close) or minimum.residual == 0 or deadline.passed:  # 3
                     break
-                newton.step(self.cg_steps)
+                step()
                 steps += 1
                 if steps & (steps - 1) == 0:
-                    monitor(newton.x.copy(), newton.Y.reshape(-1, 3).copy())
-            x, Y = newton.x, newton.Y  # 4
+                    monitor(minimum.x.copy(), minimum.Y.reshape(-1, 3).copy())
+            x, Y = minimum.x, minimum.Y  # 4
         return Solution(x, status, steps, Y.reshape(-1, 3), {"updates": updates})
 
 
-class Newton:
-    """Steps 1 to 3 for given multipliers.
+class Minimum:
+    """Steps 1 and 2 for given multipliers.
 
     x : (n, 3); value, gradient (n, 3) and Y (c, m, 3), which is Y+, there;
     residual : 1/2 |gradient|^2_{M^-1}; moved : sum_i |Y+ - Y|^2 / 2 rho_i.
@@ -181,6 +187,7 @@ class Newton:
         self._start, self._rho = Y, penalty * G.scale
         directions = np.zeros((c, 3 if m > 1 else 1, 3))
         self._local = Local(np.zeros((c, m, m)), np.zeros((c, m)), directions)
+        self._last: tuple[FloatArray, FloatArray] | None = None
         self.value = self._move(x)
 
     def _move(self, x: FloatArray) -> float:
@@ -198,10 +205,27 @@ class Newton:
         """What the compiled loops need for it."""
         return self._G, self._b, self._rho, self._local
 
-    def step(self, cg_steps: int) -> None:
+    def newton_step(self, cg_steps: int = CG_STEPS) -> None:
         """One Newton step."""
         inverse = np.linalg.inv(diagonal(*self.hessian))
-        p = conjugate_gradients(*self.hessian, inverse, self.gradient, cg_steps)  # 2
+        self._search(conjugate_gradients(*self.hessian, inverse, self.gradient, cg_steps))  # 2
+
+    def cg_step(self) -> None:
+        """One step of nonlinear conjugate gradients."""
+        p, Hp = -self.gradient, np.empty_like(self.gradient)
+        if self._last is not None:
+            before, direction = self._last
+            change = self.gradient - before
+            curvature = float(np.sum(direction * change))
+            beta = np.sum(self.gradient * (change, self.gradient), axis=(1, 2)).min()
+            p += max(0.0, float(beta)) / curvature * direction if curvature > 0 else 0.0
+            p = p if np.sum(p * self.gradient) < 0 else -self.gradient
+        self._last = (self.gradient, p)
+        product(*self.hessian, p, Hp)
+        self._search(p * float(-np.sum(self.gradient * p) / np.sum(p * Hp)))
+
+    def _search(self, p: FloatArray) -> None:
+        """To the first of x + p, x + p/2, x + p/4, ... that meets Armijo's condition."""
         slope, x, before = float(np.sum(self.gradient * p)), self.x, self.value
         for halvings in range(HALVINGS + 1):
             t = 0.5**halvings
