@@ -19,6 +19,7 @@ TO_OPTIMALITY = [
     "dykstra",
     "dykstra-plain",
     "ipopt",
+    "newton-ipm",
 ]
 """Solvers of the projection itself; the others stop at a point within the limits."""
 FIXED_COUNT = ["augmented-lagrangian-arcsim", "xpbd-20", "xpbd-compliant"]
