@@ -89,9 +89,9 @@ class AugmentedLagrangian(Solver):
     Parameters
     ----------
     penalty, max_penalty : mu at first and at most. Tuned on frame 30 of the swing at 10 to 40
-        cells, 1% and 0.1%: from ARCSim's 1e3 up to 2e4 takes 0.5 to 1 times the time of any
-        fixed mu from 1e3 to 1e5, and below 300 some never end. L-BFGS inside, with 5 to 20
-        pairs, took 2 to 3 times as long as Newton-CG.
+        cells, 1% and 0.1%: from ARCSim's 1e3 up to 2e4 takes 0.3 to 1.5 times the time of a
+        fixed mu from 1e3 to 1e4; with 100, some did not end within 10 s. L-BFGS inside took 2 to
+        3 times as long as Newton-CG.
     inner : "newton" for step 2, or "cg" for nonlinear conjugate gradients, with beta =
         max(0, min(Hestenes-Stiefel, Dai-Yuan)) and the step length of one Newton step along p.
     inner_steps : to an update, at most.

@@ -21,9 +21,9 @@ the solver `gauss-seidel` to the letter. The multipliers Y_i = 2 l_i y_i are a b
 bends, so that they do not explain where x ends, and the answer is not the closest one.
 
 XPBD's other one-sided form clamps l_i >= 0 instead of step 1, so that a row may give back what it
-took. It bounds what the skipped form does not, but the directions y move under it: measured on
-frame 30 of the swing at 1%, it ends twice as close at 10 cells, after five times as many sweeps,
-and no closer at 20 cells, where it is still above 1e-6 after 1e5 sweeps.
+took, though the directions y have moved since: measured on frame 30
+of the swing at 1%, it ends twice as close at 10 cells, after five times as many sweeps, and no
+closer at 20 cells, where it is still above 1e-6 after 1e5 sweeps.
 """
 
 from __future__ import annotations
