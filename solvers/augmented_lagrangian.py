@@ -1,4 +1,4 @@
-"""Augmented Lagrangian with Newton-CG inside (Narain, Samii, O'Brien 2012, Sec. 4.4).
+"""Augmented Lagrangian with Newton-CG inside (Narain, Samii, O'Brien 2012).
 
 R. Narain, A. Samii, J. O'Brien, "Adaptive anisotropic remeshing for cloth simulation", ACM Trans.
 Graph. 31(6), and their program ARCSim: constraints sqrt(area) (s - b) <= 0 on stretches s, penalty
@@ -75,7 +75,7 @@ class Local(NamedTuple):
 
 @dataclass(frozen=True)
 class AugmentedLagrangian(Solver):
-    """Augmented Lagrangian with Newton-CG inside (Narain, Samii, O'Brien 2012, Sec. 4.4).
+    """Augmented Lagrangian with Newton-CG inside (Narain, Samii, O'Brien 2012).
 
     | status | when |
     |---|---|
@@ -88,9 +88,9 @@ class AugmentedLagrangian(Solver):
 
     Parameters
     ----------
-    penalty, max_penalty : mu at first and at most. Tuned on frame 30 of the swing at 10 to 40
-        cells, 1% and 0.1%: from ARCSim's 1e3 up to 2e4 takes 0.3 to 1.5 times the time of a
-        fixed mu from 1e3 to 1e4; with 100, some did not end within 10 s. L-BFGS inside took 2 to
+    penalty, max_penalty : mu at first and at most. Tuned on frame 30 of the swing at 10 and 20
+        cells, 1% and 0.1%, and 40 at 1%: from 1e3, as ARCSim, up to 2e4 takes 0.3 to 1.5 times
+        the time of a fixed mu from 1e3 to 1e4; with 100, some did not end in 10 s. L-BFGS took 2 to
         3 times as long as Newton-CG.
     inner : "newton" for step 2, or "cg" for nonlinear conjugate gradients, with beta =
         max(0, min(Hestenes-Stiefel, Dai-Yuan)) and the step length of one Newton step along p.
