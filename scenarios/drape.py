@@ -13,6 +13,7 @@ from scipy.special import j0
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import square_grid
 from strainbench.physics.cloth import Cloth, Material
+from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.statics import Equilibrium, StaticsSettings, constrained_minimum
 from strainbench.problem import IntArray, Problem
 from strainbench.scenario import Scenario, StepReport
@@ -107,7 +108,7 @@ class Drape(Scenario):
     def cloth(self) -> Cloth:
         """The sheet's masses and energies."""
         rest, elements, _, pinned = self.sheet()
-        return Cloth(rest, elements, Material(), pinned)
+        return Cloth(rest, elements, Material().only(self.needs), pinned)
 
     def problem(self) -> Problem:
         """The projection in the norm of the masses."""
@@ -116,7 +117,9 @@ class Drape(Scenario):
 
     def equilibria(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[Equilibrium]:
         """Ever better approximations of the drape."""
-        return constrained_minimum(self.cloth(), self.sheet()[2], project, StaticsSettings())
+        gravity = GRAVITY if "gravity" in self.needs else np.zeros(3)
+        start, settings = self.sheet()[2], StaticsSettings()
+        return constrained_minimum(self.cloth(), start, project, settings, gravity)
 
     def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
         """Iterations towards the drape; see the base class."""

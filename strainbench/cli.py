@@ -1,4 +1,4 @@
-"""The command line: list, run, report, render, polar."""
+"""The command line: list, run, report, render, polar, ledger."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ app = typer.Typer(
 )
 console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
+DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -211,6 +212,34 @@ def polar(
         )
     for line in lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+@app.command()
+def ledger(
+    scenarios: Annotated[
+        list[str] | None, typer.Argument(help="scenario names, or paths; by default all of ours")
+    ] = None,
+    solver: Annotated[str, typer.Option(help="name, or path of a .py file")] = "clarabel",
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="KEY=VALUE of the scenarios")
+    ] = None,
+    steps: Annotated[int, typer.Option(help="time steps")] = 60,
+    tolerance: Annotated[float, typer.Option(help="aimed at by the solver")] = 1e-6,
+    results: Annotated[Path, typer.Option(help="folder of the table")] = DEFAULT_LEDGER,
+) -> None:
+    """Write what each scene models, and what each part of its physics changes in the answer."""
+    from strainbench import ledger as accounts  # pandas only where it is needed
+
+    names = scenarios or [entry.name for entry in list_scenarios()]
+    cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
+    with _bar() as bar:
+        paths = accounts.write_ledger(
+            cells,
+            results,
+            lambda items, what, total: bar.track(items, total, description=what),
+        )
+    for path in paths:
+        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def _bar() -> Progress:

@@ -162,9 +162,10 @@ class SheetScenario(Scenario):
 
 @dataclass(frozen=True)
 class ClothScenario(SheetScenario):
-    """A sheet of cloth that moves under gravity, stepped by one of the paper's schemes.
+    """A sheet of cloth, stepped by one of the paper's schemes.
 
-    Bending is built where "bending" is in `needs`.
+    Gravity, membrane and bending are built where they are in `needs`; without "inertia" each step
+    starts at rest.
 
     Parameters
     ----------
@@ -186,8 +187,8 @@ class ClothScenario(SheetScenario):
             raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
 
     def material(self) -> Material:
-        """The constants of Tang et al. 2022, section 5; no bending where it is not needed."""
-        return Material() if "bending" in self.needs else Material(bending=0.0)
+        """The constants of Tang et al. 2022, section 5; without the energies not needed."""
+        return Material().only(self.needs)
 
     def contact(self) -> Contact | None:
         """What the sheet is kept off, or None."""
@@ -233,6 +234,8 @@ class ClothScenario(SheetScenario):
             step = _Step(self, cloth, motion.velocities)
             motion = scheme(motion, self.step, step.minimise, project)
             yield step.report(motion)
+            if "inertia" not in self.needs:
+                motion = Motion(motion.positions, np.zeros_like(positions), motion.time)
 
 
 class _Step:
@@ -241,6 +244,7 @@ class _Step:
     def __init__(self, scene: ClothScenario, cloth: Cloth, velocities: FloatArray) -> None:
         self.scene, self.cloth, self.velocities = scene, cloth, velocities
         self.settings = NewtonSettings()
+        self.gravity = GRAVITY if "gravity" in scene.needs else np.zeros(3)
         self.seconds, self.pin_work = 0.0, 0.0
         self.newton: list[NewtonReport] = []
 
@@ -252,6 +256,7 @@ class _Step:
         pinned, first = self.cloth.pinned, start.copy()
         where = self.scene.pin_positions(time)
         first[pinned] = start[pinned] if where is None else where
+        inertial = inertial + step**2 * (self.gravity - GRAVITY)  # the schemes add it to all
         push = self.scene.force(start, self.velocities, time)
         if push is not None:
             inertial = inertial + step**2 * push / self.cloth.mass[:, None]
@@ -281,7 +286,7 @@ class _Step:
             factorisation_seconds=sum(r.factorisation_seconds for r in self.newton),
             line_search_seconds=sum(r.line_search_seconds for r in self.newton),
             kinetic_energy=0.5 * float(np.sum(mass * v**2)),
-            gravity_energy=-float(np.sum(mass * motion.positions @ GRAVITY[:, None])),
+            gravity_energy=-float(np.sum(mass * motion.positions @ self.gravity[:, None])),
             membrane_energy=membrane,
             bending_energy=bending,
             momentum_x=float(momentum[0]),

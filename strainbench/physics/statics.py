@@ -67,10 +67,12 @@ class Equilibrium:
     gravity: float
 
 
-def potential(cloth: Cloth, x: FloatArray) -> tuple[float, float, float, FloatArray]:
+def potential(
+    cloth: Cloth, x: FloatArray, gravity: FloatArray = GRAVITY
+) -> tuple[float, float, float, FloatArray]:
     """Membrane, bending and gravity energy [J], and the gradient (n, 3) of their sum [N]."""
     membrane, bending, gradient = cloth.energies(x)
-    weight = cloth.mass[:, None] * GRAVITY
+    weight = cloth.mass[:, None] * gravity
     return membrane, bending, -float(np.sum(weight * x)), gradient - weight
 
 
@@ -79,6 +81,7 @@ def constrained_minimum(
     start: FloatArray,
     project: Callable[[FloatArray], FloatArray],
     settings: StaticsSettings,
+    gravity: FloatArray = GRAVITY,
 ) -> Iterator[Equilibrium]:
     """Approach a minimum of the potential under limits, step by step.
 
@@ -86,11 +89,12 @@ def constrained_minimum(
     ----------
     start : (n, 3) within the limits [m]; its pinned vertices stay where they are
     project : onto the limits, in the norm of the cloth's masses
+    gravity : (3,) [m/s^2]
     """
     free, M, h, r = cloth.pattern.free, cloth.mass[:, None], settings.step, settings.relaxation
     weight = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[free]))
     z, u = start.copy(), np.zeros_like(start)
-    gradient, linear = potential(cloth, z)[-1], cloth.linear_solver
+    gradient, linear = potential(cloth, z, gravity)[-1], cloth.linear_solver
     count = 0
     while True:
         linear.factorise(cloth.hessian_values(z, cloth.mass / h**2))
@@ -100,9 +104,9 @@ def constrained_minimum(
         z = project(relaxed + u)  # 2
         u = relaxed + u - z  # 3
         forces = M * u / h**2
-        membrane, bending, gravity, gradient = potential(cloth, z)
+        membrane, bending, height, gradient = potential(cloth, z, gravity)
         residual = float(np.linalg.norm((gradient + forces)[free])) / weight
-        yield Equilibrium(z, forces, residual, membrane, bending, gravity)
+        yield Equilibrium(z, forces, residual, membrane, bending, height)
         count += 1
         if count % settings.balance_every == 0:  # 4
             apart = float(np.sum(M * (x - z) ** 2) ** 0.5)
