@@ -49,7 +49,7 @@ class Chainmail(ClothScenario):
     needs = frozenset({"inertia", "gravity", "membrane"})
 
     limit: float = 0.25
-    directions: int = 18
+    directions: int | str = 18
     norm: str = "mass"
     pattern: str = "rows"
     curve_file: str = ""
@@ -60,6 +60,7 @@ class Chainmail(ClothScenario):
             valid = ", ".join(PATTERNS)
             raise ValueError(f"pattern is {self.pattern!r}: valid are {valid}")
         if not self.curve_file:
+            self.sampled_angles()
             return
         if not Path(self.curve_file).is_file():
             raise ValueError(f"curve_file is {self.curve_file!r}: no such file")
@@ -84,7 +85,7 @@ class Chainmail(ClothScenario):
         """The curve at equally spaced angles in [-pi/2, pi/2), or a measured one."""
         if self.curve_file:
             return StretchLimits.from_csv(self.curve_file)
-        angles = -np.pi / 2 + np.pi * np.arange(self.directions) / self.directions
+        angles = self.sampled_angles()
         return StretchLimits.sampled(angles, 1 + self.limit * PATTERNS[self.pattern](angles))
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:

@@ -56,7 +56,7 @@ class Drape(Scenario):
     name = "drape"
     needs = frozenset({"gravity", "membrane", "bending"})
 
-    directions: int = None  # type: ignore[assignment] # resolved below
+    directions: int | str = None  # type: ignore[assignment] # resolved below
     shape: str = "isotropic"
     gather: float = 0.2
     folds: int = 2
@@ -68,6 +68,8 @@ class Drape(Scenario):
         if self.directions is None:
             object.__setattr__(self, "directions", SAMPLES[self.shape])
         super().__post_init__()
+        if self.shape != "isotropic":
+            self.sampled_angles()
         if not 0 <= self.gather <= 0.5:
             raise ValueError(f"gather is {self.gather}: a number from 0 to 0.5 is valid")
         if self.folds < 1:
@@ -94,7 +96,9 @@ class Drape(Scenario):
 
     def limits(self) -> StretchLimits:
         """The curve at equally spaced angles in [-pi/2, pi/2)."""
-        angles = -np.pi / 2 + np.pi * np.arange(self.directions) / self.directions
+        if self.shape == "isotropic":
+            return super().limits()
+        angles = self.sampled_angles()
         return StretchLimits.sampled(angles, self.bound(angles))
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:

@@ -50,7 +50,7 @@ class Cvxpy(Solver):
         """A reason, where the backend is not installed."""
         installed = [name for name in BACKENDS if name in cp.installed_solvers()]
         if self.backend in installed:
-            return None
+            return super().supports(problem)
         return f"cvxpy's backend {self.backend} is not installed; installed: {', '.join(installed)}"
 
     def prepare(self, problem: Problem) -> Model | None:

@@ -13,6 +13,7 @@ class NoProjection(Solver):
     """No projection: the candidate itself (implicit Euler alone, Tang et al. 2022, Table 1)."""
 
     name = "none"
+    takes_exact = True
 
     def solve(
         self,

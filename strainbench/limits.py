@@ -2,6 +2,7 @@
 
 A limit is a curve b(alpha) over material angles; a method sees samples of it, one
 constraint ||F d_i|| <= b_i for each sampled direction d_i = (cos alpha_i, sin alpha_i).
+An exact limit bounds all directions at once, by the largest singular value of F.
 """
 
 from __future__ import annotations
@@ -50,6 +51,9 @@ class StretchLimits:
     bounds : (m,) or (e, m)
         Largest stretch allowed in each direction, for all elements or for each.
         1 is the rest length: 1.01 is a limit of 1% strain.
+    spectral : bool
+        Whether the limit is exact, see `exact`: one constraint an element, ||F D||_2 <= 1 with
+        D = diag(1 / bounds). The directions are then the material axes.
 
     Raises
     ------
@@ -61,6 +65,7 @@ class StretchLimits:
 
     directions: FloatArray
     bounds: FloatArray
+    spectral: bool = False
 
     def __post_init__(self) -> None:
         directions = frozen_array("limits.directions", self.directions, 2)
@@ -78,6 +83,8 @@ class StretchLimits:
             )
         for row in np.flatnonzero(np.abs(np.linalg.norm(directions, axis=1) - 1) > 1e-6)[:1]:
             raise ValueError(f"limits.directions[{row}] is {directions[row]}: not a unit vector")
+        if self.spectral and not np.array_equal(directions, np.eye(len(directions))):
+            raise ValueError("limits.directions: exact limits have the material axes, in order")
         keep = _distinct(directions, bounds)
         for name, array in (("directions", directions[keep]), ("bounds", bounds[..., keep])):
             array.setflags(write=False)
@@ -99,6 +106,30 @@ class StretchLimits:
         """Bounds along warp (0 degrees), weft (90 degrees) and both diagonals (+-45 degrees)."""
         angles = np.pi / 4 * np.array([-2, -1, 0, 1])
         return cls.sampled(angles, [weft, shear, warp, shear])
+
+    @classmethod
+    def exact(cls, bound: ArrayLike, weft: ArrayLike | None = None, dim: int = 2) -> StretchLimits:
+        """No direction is stretched beyond the limit: a bound on F's largest singular value.
+
+        Parameters
+        ----------
+        bound : float or (e,)
+            ||F||_2 <= bound, for all elements or for each.
+        weft : float or (e,), optional
+            The orthotropic limit ||F D||_2 <= 1 with D = diag(1 / bound, 1 / weft): the stretch
+            in a direction d is at most ||D^-1 d||, `bound` along warp (0 degrees) and `weft`
+            along weft (90 degrees).
+        dim : 2 for surfaces, 3 for volumes, which have no weft.
+        """
+        if dim not in (2, 3) or (dim == 3 and weft is not None):
+            raise ValueError(f"dim is {dim}: valid are 2, or 3 without a weft")
+        warp = frozen_array("limits.bound", bound, 0, 1)
+        other = warp if weft is None else frozen_array("limits.weft", weft, 0, 1)
+        try:
+            axes = np.broadcast_arrays(warp, *[other] * (dim - 1))
+        except ValueError:
+            raise ValueError(f"limits.weft: shape {other.shape} for bound {warp.shape}") from None
+        return cls(np.eye(dim), np.stack(axes, axis=-1), spectral=True)
 
     @classmethod
     def sampled(cls, angles: ArrayLike, bounds: ArrayLike) -> StretchLimits:

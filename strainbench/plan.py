@@ -50,7 +50,7 @@ def parse_value(owner: str, key: str, hint: Any, text: str) -> object:
             return None
         if bool in kinds:
             return {"true": True, "false": False}[text.lower()]
-        if int in kinds:
+        if int in kinds and (str not in kinds or text.lstrip("-").isdigit()):
             return int(text)
         if float in kinds:
             return float(text[:-1]) / 100 if text.endswith("%") else float(text)

@@ -98,7 +98,7 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
     journal.write(
         "loaded",
         variables=3 * len(problem.free),
-        constraints=problem.rows,
+        constraints=problem.constraints,
         nonzeros=3 * problem.G.nnz,
         needs=", ".join(sorted(scenario.needs)),
         blas_threads=threads,

@@ -4,15 +4,17 @@ minimise 1/2 ||x - target||_M^2  subject to  ||(G x)_i|| <= b_i  and  x = target
 
 The deformation gradient F_e = sum_k x_k B_k is linear in the positions, so each limited
 direction d of each element is one row of a sparse matrix G (rows x vertices), with entries
-B_k . d, that acts on the three coordinates alike.
+B_k . d, that acts on the three coordinates alike. With exact limits the rows of an element are
+the columns of F_e D, and the largest singular value of these together is bounded.
 """
 
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import Literal
 
 import numpy as np
 import scipy.sparse as sp
@@ -199,8 +201,12 @@ class Problem:
     def tightened(self, margin: float) -> Problem:
         """The same projection with every bound lowered by `margin`."""
         other = copy.copy(self)
-        limits = StretchLimits(self.limits.directions, self.limits.bounds - margin)
-        object.__setattr__(other, "limits", limits)
+        limits = self.limits
+        if limits.spectral:  # D stays as it is
+            bounds = limits.bounds * (1 - margin / limits.bounds.min(axis=-1, keepdims=True))
+        else:
+            bounds = limits.bounds - margin
+        object.__setattr__(other, "limits", replace(limits, bounds=bounds))
         other.__dict__.pop("bounds", None)
         other.__dict__.pop("_reach", None)
         return other
@@ -212,8 +218,13 @@ class Problem:
 
     @property
     def rows(self) -> int:
-        """Number of constraints: elements times limited directions."""
+        """Rows of G: elements times limited directions."""
         return len(self.elements) * len(self.limits.directions)
+
+    @property
+    def constraints(self) -> int:
+        """Number of constraints: one a row of G, or one an element where limits are exact."""
+        return len(self.elements) if self.limits.spectral else self.rows
 
     @property
     def gradients(self) -> FloatArray:
@@ -259,8 +270,11 @@ class Problem:
 
     @cached_property
     def row_coefficients(self) -> FloatArray:
-        """(rows, k) entries B_k . d of each row of G [1/m]."""
+        """(rows, k) entries B_k . d of each row of G [1/m]; exact limits scale each axis by D."""
         per_element: FloatArray = np.einsum("ekc,mc->emk", self.gradients, self.limits.directions)
+        if self.limits.spectral:
+            axes = np.atleast_2d(self.limits.bounds)
+            per_element = per_element * (axes.min(axis=1, keepdims=True) / axes)[:, :, None]
         return _read_only(per_element.reshape(self.rows, -1))
 
     @cached_property
@@ -279,17 +293,32 @@ class Problem:
 
     @cached_property
     def bounds(self) -> FloatArray:
-        """(rows,) largest stretch b_i of each row of G."""
-        shape = (len(self.elements), len(self.limits.directions))
-        return _read_only(np.broadcast_to(self.limits.bounds, shape).reshape(-1).copy())
+        """(constraints,) largest stretch b_i; with exact limits that of the tightest axis."""
+        bounds = self.limits.bounds
+        if self.limits.spectral:
+            bounds = bounds.min(axis=-1, keepdims=True)
+        shape = (len(self.elements), bounds.shape[-1])
+        return _read_only(np.broadcast_to(bounds, shape).reshape(-1).copy())
 
     def stretches(self, positions: FloatArray) -> FloatArray:
-        """(rows,) stretch ||(G x)_i|| of every limited direction at `positions` (n, 3)."""
-        stretches: FloatArray = np.linalg.norm(self.G @ positions, axis=1)
-        return stretches
+        """(constraints,) stretch at `positions` (n, 3): ||(G x)_i||, or ||F D||_2 min(bounds)."""
+        return self._norms(self.G @ positions, 2)
+
+    def dual_norms(self, multipliers: FloatArray) -> FloatArray:
+        """(constraints,) |Y_i| of `multipliers` (rows, 3), or nuclear norms of exact limits."""
+        return self._norms(multipliers, "nuc")
+
+    def _norms(self, rows: FloatArray, order: Literal[2, "nuc"]) -> FloatArray:
+        """(constraints,) of (rows, 3): vector norms, or matrix norms with exact limits."""
+        if self.limits.spectral:
+            blocks = rows.reshape(len(self.elements), -1, 3)
+            norms: FloatArray = np.linalg.norm(blocks, order, axis=(1, 2))
+        else:
+            norms = np.linalg.norm(rows, axis=1)
+        return norms
 
     def violations(self, positions: FloatArray) -> FloatArray:
-        """(rows,) max(0, ||(G x)_i|| - b_i)."""
+        """(constraints,) max(0, stretch - b_i)."""
         return np.maximum(0.0, self.stretches(positions) - self.bounds)
 
     def deformation_gradients(self, positions: FloatArray) -> FloatArray:
@@ -345,8 +374,9 @@ class Problem:
 def longest_edges(problem: Problem) -> tuple[IntArray, FloatArray]:
     """How long the limits let each edge become.
 
-    With e = sum_j c_j d_j over dim of the limited directions, ||F e|| <= sum_j |c_j| b_j;
-    the smallest such bound over all choices of directions and adjacent elements is kept.
+    With e = sum_j c_j d_j over dim of the limited directions, ||F e|| <= sum_j |c_j| b_j; the
+    smallest such bound over all choices of directions and adjacent elements is kept. With exact
+    limits, ||F e|| <= ||D^-1 e||.
 
     Returns
     -------
@@ -357,13 +387,16 @@ def longest_edges(problem: Problem) -> tuple[IntArray, FloatArray]:
     """
     dim = problem.rest.shape[-1]
     directions = problem.limits.directions
-    bounds = problem.bounds.reshape(len(problem.elements), len(directions))
+    bounds = np.broadcast_to(problem.limits.bounds, (len(problem.elements), len(directions)))
     pairs = list(combinations(range(dim + 1), 2))
     ends = problem.elements[:, pairs]
     corners = rest_corners(problem.rest, problem.elements)
     first, second = np.array(pairs).T
     vectors = corners[:, second] - corners[:, first]
     longest = np.full(ends.shape[:2], np.inf)
+    if problem.limits.spectral:
+        longest = np.linalg.norm(vectors * bounds[:, None], axis=2)
+        directions = directions[:0]
     for chosen in combinations(range(len(directions)), dim):
         basis = directions[list(chosen)].T
         if abs(np.linalg.det(basis)) < 1e-9:

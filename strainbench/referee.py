@@ -3,7 +3,8 @@
 With any multipliers Y, L(x) = f(x) + sum_i <Y_i, (G x)_i> - b_i |Y_i| is strongly convex, with
 its minimum D(Y) at x_Y = target - M^-1 G^T Y on the free vertices. So, in the norm of M:
 
-1. D(Y) = <Y, G target> - 1/2 ||G^T Y||^2_{M^-1} - sum b_i |Y_i| is a lower bound on f(x*).
+1. D(Y) = <Y, G target> - 1/2 ||G^T Y||^2_{M^-1} - sum b_i |Y_i| is a lower bound on f(x*);
+   with exact limits |Y_i| is the nuclear norm of an element's multiplier matrix.
 2. A point with violations v_i has L(x) <= f(x) + sum |Y_i| v_i, so
    1/2 ||x - x_Y||^2 <= f(x) + sum |Y_i| v_i - D(Y): its gap, never negative.
 3. A feasible x_ref has 1/2 ||x_ref - x*||^2 <= f(x_ref) - D(Y), and x* the same distance to x_Y
@@ -36,7 +37,8 @@ class Certificate:
     outcome : "optimal" (violation and gap both met), "feasible" (the violation alone),
         "violated", or "no answer" (nothing usable came back).
     reason : in words, where the outcome is not "optimal".
-    max_violation : largest max(0, ||F d|| - b) over the limited directions.
+    max_violation : largest max(0, ||F d|| - b) over the limited directions; with exact limits
+        largest max(0, ||F D||_2 - 1) times the tightest axis's bound.
     max_principal_stretch : largest singular value of any F, the true stretch.
     objective : f(x) = 1/2 ||x - target||_M^2.
     lower_bound : D(Y) <= f(x*), or 0 where the reference failed.
@@ -45,7 +47,7 @@ class Certificate:
     distance : largest distance of a vertex from the reference solution; NaN without one.
     distance_bound : rigorous upper bound on ||x - x*||, the 2-norm over all vertices.
     reference_error : rigorous upper bound on ||x_ref - x*|| in the same norm.
-    active_constraints : rows within 1e-6 of their bound at the reference solution.
+    active_constraints : constraints within 1e-6 of their bound at the reference solution.
     """
 
     outcome: str

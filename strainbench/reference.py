@@ -25,7 +25,7 @@ REFERENCE_SOLVER = "clarabel-tight"
 TOLERANCE = 1e-6  # asked of the reference solver, which stalls below
 ATTEMPTS = 4  # each but the first with bounds tightened further, by this and twice the violation
 MARGIN = 1e-8
-ACTIVE = 1e-6  # rows this close to their bound count as active
+ACTIVE = 1e-6  # constraints this close to their bound count as active
 REPAIRABLE = 1e-5  # violations up to this are repaired
 REGULAR = 1e-8  # of the repair's matrix, relative to its mean diagonal
 REPAIRS = 50  # Newton steps at most, each a pair of triangular solves
@@ -38,10 +38,10 @@ class Reference:
     Attributes
     ----------
     positions : (n, 3) [m], feasible, or NaN where none was found
-    multiplier_norms : (rows,) |Y_i|
+    multiplier_norms : (constraints,) |Y_i|
     lower_bound : on the objective of any feasible point
     error : rigorous bound on ||positions - x*||, and on ||x_Y - x*|| [m]; infinite without one
-    active_constraints : rows within ACTIVE of their bound
+    active_constraints : constraints within ACTIVE of their bound
     infeasible : why no positions can meet the limits, where that is certain
     """
 
@@ -65,8 +65,9 @@ def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> 
     lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its own rounding.
     """
     Y = np.where(np.isfinite(multipliers), multipliers, 0.0)
-    norms = np.linalg.norm(Y, axis=1)
-    terms = np.sum(Y * (problem.G @ problem.target), axis=1) - problem.bounds * norms
+    norms = problem.dual_norms(Y)
+    products = np.sum((Y * (problem.G @ problem.target)).reshape(len(norms), -1), axis=1)
+    terms = products - problem.bounds * norms
     back = (problem.G.T @ Y)[problem.free]
     q = float(np.sum(back**2 / problem.weights[problem.free, None]))
     rounding = 16 * np.finfo(float).eps * 2 * float(np.sum(problem.bounds * norms))

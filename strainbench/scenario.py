@@ -64,7 +64,8 @@ class Scenario(ABC):
     ----------
     resolution : cells a side.
     limit : largest strain allowed; 0.01 is 1%.
-    directions : sampled directions an element.
+    directions : sampled directions an element, or "exact" for a limit on the largest singular
+        value.
     """
 
     name: ClassVar[str]
@@ -72,7 +73,7 @@ class Scenario(ABC):
 
     resolution: int = 20
     limit: float = 0.01
-    directions: int = 4
+    directions: int | str = 4
 
     def __post_init__(self) -> None:
         if self.resolution < 1:
@@ -81,8 +82,9 @@ class Scenario(ABC):
             raise ValueError(
                 f"limit is {self.limit}: a strain between 0 and 1 is valid, 0.01 or 1% for 1%"
             )
-        if self.directions < 1:
-            raise ValueError(f"directions is {self.directions}: a whole number above 0 is valid")
+        if self.directions != "exact" and (isinstance(self.directions, str) or self.directions < 1):
+            valid = "a whole number above 0, or exact, is valid"
+            raise ValueError(f"directions is {self.directions}: {valid}")
 
     @abstractmethod
     def problem(self) -> Problem:
@@ -101,6 +103,12 @@ class Scenario(ABC):
         """The fields and their values."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
+    def sampled_angles(self) -> FloatArray:
+        """(directions,) equally spaced in [-pi/2, pi/2) [rad], for limits given by a curve."""
+        if isinstance(self.directions, str):
+            raise ValueError(f"directions is exact: {self.name} samples a curve of limits")
+        return -np.pi / 2 + np.pi * np.arange(self.directions) / self.directions
+
     @property
     def label(self) -> str:
         """Name, resolution and limit, then what else differs from the defaults."""
@@ -115,6 +123,8 @@ class Scenario(ABC):
 
     def limits(self) -> StretchLimits:
         """The same bound in all directions."""
+        if isinstance(self.directions, str):
+            return StretchLimits.exact(1 + self.limit)
         return StretchLimits.isotropic(1 + self.limit, self.directions)
 
     def curve(self) -> tuple[FloatArray, FloatArray] | None:

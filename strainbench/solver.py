@@ -83,13 +83,17 @@ class Solver(ABC):
     The first line of the docstring reads "method (paper)"; `strainbench list` shows both.
     `name` is lower case with hyphens. `variants` names other settings worth showing beside the
     defaults: {"default": {"scaling": "default"}} adds the solver `<name>-default`.
+    `takes_exact` says that the method has a form for exact limits.
     """
 
     name: ClassVar[str]
     variants: ClassVar[Mapping[str, Mapping[str, object]]] = {}
+    takes_exact: ClassVar[bool] = False
 
-    def supports(self, problem: Problem) -> str | None:  # noqa: ARG002
+    def supports(self, problem: Problem) -> str | None:
         """None, or the reason why this method cannot take the problem."""
+        if problem.limits.spectral and not self.takes_exact:
+            return "it has no form for exact limits, only for sampled directions"
         return None
 
     def prepare(self, problem: Problem) -> Any:  # noqa: ARG002
@@ -168,7 +172,7 @@ def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
         rest=rest,
         elements=elements,
         target=np.column_stack([2 * bounds.max() * rest, 0.1 * rest[:, 0]]),
-        limits=StretchLimits(problem.limits.directions, bounds),
+        limits=StretchLimits(problem.limits.directions, bounds, problem.limits.spectral),
         pinned=np.array([0]) if len(problem.pinned) else np.array([], dtype=np.int64),
         mass=None if problem.mass is None else np.linspace(1.0, 2.0, len(rest)),
     )

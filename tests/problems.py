@@ -51,15 +51,30 @@ def random_limits(rng, elements, directions, limit, per_element):
     return StretchLimits.sampled(angles, 1 + limit * rng.uniform(0.5, 2, directions))
 
 
+def random_exact_limits(rng, elements, limit, per_element):
+    """A bound on the largest singular value, or its orthotropic relative, maybe by element."""
+    size = elements if per_element else None
+    warp, weft = 1 + limit * rng.uniform(0.5, 2, size), 1 + limit * rng.uniform(0.5, 2, size)
+    return StretchLimits.exact(warp, weft if rng.random() < 0.5 else None)
+
+
 def random_placed_problem(
-    rng, directions=None, limit=None, mass=None, pins=None, per_element=None, vertices=None
+    rng,
+    directions=None,
+    limit=None,
+    mass=None,
+    pins=None,
+    per_element=None,
+    vertices=None,
+    exact=False,
 ):
     """A problem beyond its limits, and a feasible point: the rest shape, moved rigidly.
 
     Parameters
     ----------
     directions : 1 to 12; limit : 0.1% to 20%; mass : whether there are masses;
-    pins : how many, 0 to 4; per_element : whether bounds differ between elements.
+    pins : how many, 0 to 4; per_element : whether bounds differ between elements;
+    exact : whether singular values are limited.
         None draws each at random.
     """
     rest, elements = random_mesh(rng, vertices)
@@ -69,7 +84,10 @@ def random_placed_problem(
     mass = rng.random() < 0.5 if mass is None else mass
     pins = int(rng.integers(0, 5)) if pins is None else pins
     per_element = rng.random() < 0.3 if per_element is None else per_element
-    limits = random_limits(rng, len(elements), directions, limit, per_element)
+    if exact:
+        limits = random_exact_limits(rng, len(elements), limit, per_element)
+    else:
+        limits = random_limits(rng, len(elements), directions, limit, per_element)
 
     size = np.ptp(rest, axis=0).max()
     frame, shift = rotation(rng)[:, :2], size * rng.normal(size=3)

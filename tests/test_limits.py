@@ -198,3 +198,27 @@ def test_isotropic_needs_a_bound_above_zero(bound, word):
 def test_bounds_that_are_no_array_of_numbers_are_named(build):
     with pytest.raises(ValueError, match=r"limits\.bounds"):
         build()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"bound": 0.0}, r"limits\.bounds\[0\] is 0"),
+        ({"bound": 1.1, "weft": [1.1, -1.0]}, r"limits\.bounds\[1, 1\] is -1"),
+        ({"bound": [1.1, 1.2], "weft": [1.1, 1.2, 1.3]}, r"limits\.weft: shape \(3,\)"),
+        ({"bound": [[1.1]]}, r"limits\.bound: expected 0 or 1 dimensions"),
+        ({"bound": np.nan}, r"limits\.bound\[\] is nan"),
+        ({"bound": 1.1, "dim": 4}, r"dim is 4: valid are 2, or 3"),
+        ({"bound": 1.1, "weft": 1.2, "dim": 3}, r"dim is 3: valid are 2, or 3 without a weft"),
+    ],
+)
+def test_bad_exact_limits_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        StretchLimits.exact(**arguments)
+
+
+def test_exact_limits_are_given_on_the_material_axes():
+    with pytest.raises(ValueError, match="material axes"):
+        StretchLimits(np.eye(2)[::-1], np.array([1.1, 1.1]), spectral=True)
+    np.testing.assert_array_equal(StretchLimits.exact([1.1, 1.2]).bounds, [[1.1, 1.1], [1.2, 1.2]])
+    np.testing.assert_array_equal(StretchLimits.exact(1.1, 1.3).bounds, [1.1, 1.3])

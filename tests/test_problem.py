@@ -8,7 +8,14 @@ import pytest
 from strainbench import Problem, StretchLimits, solve
 from strainbench.mesh import square_grid
 from strainbench.problem import longest_edges
-from tests.problems import moved, random_placed_problem, random_problem, renumbered, rotation
+from tests.problems import (
+    central_difference,
+    moved,
+    random_placed_problem,
+    random_problem,
+    renumbered,
+    rotation,
+)
 
 SEEDS = range(8)
 AXES = StretchLimits(np.eye(3), [1.1, 1.1, 1.1])
@@ -518,3 +525,69 @@ def test_a_new_target_of_another_size_is_refused_with_rest_by_corner():
     problem = triangle(rest=shared.rest[shared.elements])
     with pytest.raises(ValueError, match=r"target: shape \(5, 3\)"):
         problem.with_target(np.zeros((5, 3)))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_exact_limits_bound_the_singular_values(seed):
+    problem, placed = random_placed_problem(np.random.default_rng(seed), exact=True)
+    axes = np.broadcast_to(problem.limits.bounds, (len(problem.elements), 2))
+    F = problem.deformation_gradients(problem.target)
+    relative = np.linalg.svd(F / axes[:, None], compute_uv=False)[:, 0]
+    assert problem.constraints == len(problem.elements) == problem.rows / 2
+    np.testing.assert_allclose(problem.stretches(problem.target), relative * axes.min(axis=1))
+    assert not np.any(problem.violations(placed))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_exact_limits_hold_in_every_direction(seed):
+    """||F d|| <= ||D^-1 d|| wherever ||F D||_2 <= 1, with equality in some direction."""
+    rng = np.random.default_rng(seed)
+    problem = random_problem(rng, exact=True, per_element=False)
+    F = problem.deformation_gradients(problem.target)[0]
+    F *= problem.bounds[0] / problem.stretches(problem.target)[0]
+    angles = np.linspace(0, np.pi, 2000)
+    d = np.column_stack([np.cos(angles), np.sin(angles)])
+    admitted = np.linalg.norm(d * problem.limits.bounds, axis=1)
+    ratio = np.linalg.norm(d @ F.T, axis=1) / admitted
+    assert 1 - 1e-5 < ratio.max() < 1 + 1e-12
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_dual_norms_are_dual_to_stretches(exact):
+    """<Y, G x> <= sum |Y_i| stretch_i, with equality where Y is the stretches' gradient."""
+    rng = np.random.default_rng(3)
+    problem = random_problem(rng, exact=exact)
+    x, stretches = problem.target, problem.stretches(problem.target)
+    for _ in range(20):
+        Y = rng.normal(size=(problem.rows, 3))
+        assert np.sum(Y * (problem.G @ x)) <= problem.dual_norms(Y) @ stretches
+    gradient = central_difference(lambda y: problem._norms(y, 2).sum(), problem.G @ x)
+    assert np.sum(gradient * (problem.G @ x)) == pytest.approx(stretches.sum(), rel=1e-6)
+    np.testing.assert_allclose(problem.dual_norms(gradient), 1, rtol=1e-6)
+
+
+def test_tightened_exact_limits_keep_their_axes():
+    problem = random_problem(np.random.default_rng(5), exact=True)
+    tight = problem.tightened(1e-3)
+    np.testing.assert_allclose(tight.bounds, problem.bounds - 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(tight.G.data, problem.G.data, rtol=1e-12)
+    fresh = Problem(problem.rest, problem.elements, problem.target, tight.limits, problem.pinned)
+    np.testing.assert_allclose(fresh.G.data, problem.G.data, rtol=1e-9)
+
+
+def test_exact_limits_say_how_far_pins_may_be_apart():
+    rest, elements = square_grid(2, 1.0, "uniform")
+    target = np.column_stack([rest * [1.06, 1.0], np.zeros(len(rest))])
+    corners = np.flatnonzero((rest[:, 1] == 0) & (rest[:, 0] != 0.5))
+    for limit, found in ((1.05, "infeasible"), (1.07, None)):
+        problem = Problem(rest, elements, target, StretchLimits.exact(limit, 2.0), corners)
+        reason = problem.infeasible_pins()
+        assert reason is None if found is None else reason.startswith(found)
+
+
+def test_exact_limits_of_volumes():
+    rest = np.vstack([np.zeros(3), np.eye(3)])
+    target = rest @ np.diag([1.0, 1.2, 0.9])
+    problem = Problem(rest, np.array([[0, 1, 2, 3]]), target, StretchLimits.exact(1.1, dim=3))
+    np.testing.assert_allclose(problem.violations(target), [0.1])
+    np.testing.assert_allclose(problem.dual_norms(np.diag([1.0, -2.0, 3.0])), [6.0])

@@ -48,9 +48,13 @@ def admissible(limits: StretchLimits, angles: FloatArray) -> FloatArray:
     """(a,) largest stretch at `angles` that the samples alone admit; infinite where they do not.
 
     With C = F^T F = [[p + q, r], [r, p - q]], ||F d(a)||^2 = p + q cos 2a + r sin 2a is linear.
-    So this is a linear objective over the samples' half-planes and the cone C >= 0.
+    So this is a linear objective over the samples' half-planes and the cone C >= 0. Exact limits
+    admit ||D^-1 d||.
     """
     samples, bounds = sampled_curve(limits)
+    if limits.spectral:
+        longest: FloatArray = np.hypot(np.cos(angles) * bounds[0], np.sin(angles) * bounds[1])
+        return longest
     cone = np.pi * np.arange(TANGENTS) / TANGENTS
     A = np.concatenate([_squared_stretch(samples), -_squared_stretch(cone)])
     b = np.concatenate([bounds**2, np.zeros(TANGENTS)])
@@ -142,6 +146,11 @@ def _draw_limits(
     if curve is not None:
         turn, bounds = _closed(*curve)
         ax.plot(turn, 100 * (bounds - 1), color="black", lw=1.2, label="limit")
+    reach = 100 * (admissible(limits, ANGLES) - 1)
+    if limits.spectral:
+        if curve is None:
+            ax.plot(*_closed(ANGLES, reach), color="black", lw=1.2, label="limit")
+        return
     angles, bounds = sampled_curve(limits)
     samples = "sample" if len(bounds) == 1 else f"{len(bounds)} samples"
     ax.plot(
@@ -154,7 +163,6 @@ def _draw_limits(
         zorder=5,
         label=f"its {samples}" if curve is not None else f"limit: {samples}",
     )
-    reach = 100 * (admissible(limits, ANGLES) - 1)
     if np.all(np.isfinite(reach)):
         ax.plot(
             *_closed(ANGLES, reach),
