@@ -31,7 +31,9 @@ class StepReport:
     Energies are in J, with the velocities after the projection; heights count from y = 0. The
     momentum is in kg m/s. `pin_work` [J] is the work of the forces that hold the pins, as the
     minimisations of the step find them; it is 0 for pins that do not move. `penetration` [m] is
-    the depth of the deepest vertex inside an obstacle, after the projection.
+    the depth of the deepest vertex inside an obstacle, after the projection. Of a scene at rest,
+    `equilibrium_residual` is the force that is left, relative to the weight, and
+    `equilibrium_distance` [m] how far the farthest vertex is from a certified equilibrium.
     """
 
     time: float = 0.0  # [s], at the end of the step
@@ -51,6 +53,8 @@ class StepReport:
     pin_work: float = 0.0
     contact_energy: float = 0.0
     penetration: float = 0.0
+    equilibrium_residual: float = float("nan")
+    equilibrium_distance: float = float("nan")
 
 
 @dataclass(frozen=True)

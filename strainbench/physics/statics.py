@@ -17,7 +17,8 @@ norm of the masses M, with h a pseudo time step,
 
 M u' / h^2 is a normal of C at z' in the projection's own norm: the forces G^T Y of the limits. So
 with any h the fixed point has grad E(z) + G^T Y = 0, the conditions of a constrained minimum, and
-their residual at z' is known without a further solve. Minimising E itself in 1 does not converge:
+their residual at z' is known without a further solve; started with z and u of such a point, it
+stays there. Minimising E itself in 1 does not converge:
 cloth under compression is not convex, and the clamped model is. Neither is there a proof for a
 non-convex E, nor one minimum: what is found depends on the start.
 """
@@ -82,6 +83,7 @@ def constrained_minimum(
     project: Callable[[FloatArray], FloatArray],
     settings: StaticsSettings,
     gravity: FloatArray = GRAVITY,
+    limit_forces: FloatArray | None = None,
 ) -> Iterator[Equilibrium]:
     """Approach a minimum of the potential under limits, step by step.
 
@@ -90,10 +92,12 @@ def constrained_minimum(
     start : (n, 3) within the limits [m]; its pinned vertices stay where they are
     project : onto the limits, in the norm of the cloth's masses
     gravity : (3,) [m/s^2]
+    limit_forces : (n, 3) at the start [N], or None for none
     """
     free, M, h, r = cloth.pattern.free, cloth.mass[:, None], settings.step, settings.relaxation
     weight = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[free]))
-    z, u = start.copy(), np.zeros_like(start)
+    z = start.copy()
+    u = np.zeros_like(start) if limit_forces is None else h**2 * limit_forces / M
     gradient, linear = potential(cloth, z, gravity)[-1], cloth.linear_solver
     count = 0
     while True:
