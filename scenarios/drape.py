@@ -160,6 +160,7 @@ class Drape(Scenario):
         for state in self.equilibria(project, drape if self.start == "drape" else None):
             apart = state.positions - drape.positions if drape else np.array([[np.nan]])
             yield StepReport(
+                time=float("nan"),
                 newton_iterations=1,
                 kinetic_energy=0.0,
                 gravity_energy=state.gravity,
