@@ -37,6 +37,7 @@ console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
 DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
+DEFAULT_STEPS = 10
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
@@ -74,7 +75,12 @@ def run(
         list[str] | None,
         typer.Option("--set", help="KEY=V1,V2 of the scenario, or SOLVER.KEY=V1,V2"),
     ] = None,
-    steps: Annotated[int, typer.Option(help="time steps a cell")] = 10,
+    steps: Annotated[
+        int | None, typer.Option(help=f"time steps a cell; {DEFAULT_STEPS} if not given")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="seconds of the scene's time a cell, instead of --steps")
+    ] = None,
     mode: Annotated[str, typer.Option(help="simulate (closed loop) or replay (same frames)")] = (
         "simulate"
     ),
@@ -103,8 +109,17 @@ def run(
             raise ValueError(f"{name} {value}: a whole number above 0 is valid")
     if memory_limit is not None and not memory_limit > 0:
         raise ValueError(f"--memory-limit {memory_limit}: a number of MB above 0 is valid")
+    if steps is not None and duration is not None:
+        raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
     cells = plan(
-        scenarios, solver or ["all"], set_ or [], mode, steps, _numbers(tolerance), time_limit
+        scenarios,
+        solver or ["all"],
+        set_ or [],
+        mode,
+        DEFAULT_STEPS if steps is None else steps,
+        _numbers(tolerance),
+        time_limit,
+        duration,
     )
     memory = memory_limit or 0.75 * psutil.virtual_memory().total / 1024**2 / jobs
     settings = Settings(results, jobs, threads, memory, rerun)
