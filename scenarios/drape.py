@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.integrate import cumulative_simpson
@@ -131,17 +131,19 @@ class Drape(Scenario):
         """(3,) [m/s^2], where the scene needs it."""
         return GRAVITY if "gravity" in self.needs else np.zeros(3)
 
-    def certified(self) -> Equilibrium:
-        """A drape, found without any projection.
+    def certified(self) -> Equilibrium | None:
+        """A drape, found without any projection; None with exact limits.
 
         Raises
         ------
         ArithmeticError
             If none was found to the tolerance.
         """
+        if self.directions == "exact":
+            return None
         found, reason = equilibrium(self.cloth(), self.problem(), BarrierSettings(), self.gravity)
         if reason:
-            raise ArithmeticError(f"no drape to start from: {reason}")
+            raise ArithmeticError(f"no certified drape: {reason}")
         return found
 
     def equilibria(
@@ -156,7 +158,7 @@ class Drape(Scenario):
 
     def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
         """Iterations at the drape, or towards one; see the base class."""
-        drape = None if self.directions == "exact" else self.certified()
+        drape = self.certified()
         for state in self.equilibria(project, drape if self.start == "drape" else None):
             apart = state.positions - drape.positions if drape else np.array([[np.nan]])
             yield StepReport(
@@ -169,6 +171,10 @@ class Drape(Scenario):
                 equilibrium_residual=state.residual,
                 equilibrium_distance=float(np.linalg.norm(apart, axis=1).max()),
             )
+
+    def warm_up(self) -> None:
+        """With one fold in 3 cells, which is not flat (see `strainbench.physics.equilibrium`)."""
+        next(replace(self, resolution=3, folds=1).play(lambda target: target))
 
 
 def pleat(s: FloatArray, gather: float, folds: int) -> tuple[FloatArray, FloatArray]:

@@ -189,3 +189,16 @@ def test_exact_limits_start_from_the_folds():
     report = next(scene.play(lambda target: target))
     assert np.isnan(report.equilibrium_distance)
     assert np.isfinite(report.equilibrium_residual)
+
+
+@pytest.mark.parametrize("shape", SAMPLES)
+@pytest.mark.parametrize("limit", [0.001, 0.1])
+@pytest.mark.parametrize("gather", [0.0, 0.5])
+def test_any_drape_warms_up(shape, limit, gather):
+    Drape(resolution=20, shape=shape, limit=limit, gather=gather, folds=3).warm_up()
+
+
+def test_a_drape_that_is_not_certified_is_not_played():
+    scene = Drape(resolution=3, folds=3)  # flat: too few cells for its folds
+    with pytest.raises(ArithmeticError, match="no certified drape: 1000 iterations, residual"):
+        next(scene.play(lambda target: target))

@@ -18,8 +18,10 @@ from l_i = mu / q_i:
    fourfold where it was halved, as bending's Hessian is but Gauss and Newton's, else it falls
 6. l_i moves by a Newton step of its own, and stays within a factor 1e4 of mu / q_i
 
-One minimum of several: E is not convex, and which fold goes where depends on the start. It needs
-no projection, so it tells how far a drape found by projections is from a true one.
+One minimum of several: E is not convex, and which fold goes where depends on the start. A flat
+start is a saddle, and may not be left: the drape fails where its cells are too few for its folds,
+such as 2 for 2 or 3 for 3; at 3 to 6, 10, 15, 30 and 60 for 2 it does not. The method needs no
+projection, so it tells how far a drape found by projections is from a true one.
 """
 
 from __future__ import annotations
