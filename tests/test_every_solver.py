@@ -12,7 +12,7 @@ from tests.problems import random_problem
 
 NAMES = [e.name for e in list_solvers() if not e.unavailable]
 LIMITING = [n for n in NAMES if n != "none"]
-TO_OPTIMALITY = ["clarabel", "clarabel-default", "cvxpy", "ipopt"]
+TO_OPTIMALITY = ["clarabel", "clarabel-default", "cvxpy", "ipopt", "newton-ipm"]
 """Solvers of the projection itself; the others stop at a point within the limits."""
 UNSCALED = ["clarabel-default", "clarabel-paper", "ipopt-default"]
 """Out of the box: an objective known to 1e-8 of its size leaves positions uncertain by 1e-4."""
@@ -111,7 +111,7 @@ def test_pins_stay_and_the_problem_is_not_changed(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["clarabel", "clarabel-default", "clarabel-paper", "cvxpy", "ipopt"]
+    "name", ["clarabel", "clarabel-default", "clarabel-paper", "cvxpy", "ipopt", "newton-ipm"]
 )
 def test_multipliers_are_stationary(name):
     problem = random_problem(np.random.default_rng(9), directions=4, limit=0.05)

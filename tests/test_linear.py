@@ -11,7 +11,7 @@ from strainbench.discovery import find_solver
 from strainbench.physics import linear
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
 from strainbench.physics.linear import (
-    Cholmod,
+    PACKAGES,
     NotPositiveDefiniteError,
     SuperLU,
     available_linear_solvers,
@@ -21,10 +21,9 @@ from strainbench.physics.linear import (
 from strainbench.physics.profile import profile, projection, run, table
 
 
-@pytest.fixture(params=[Cholmod, SuperLU], ids=lambda kind: kind.name)
+@pytest.fixture(params=PACKAGES, ids=lambda kind: kind.name)
 def kind(request):
-    if request.param is Cholmod:
-        pytest.importorskip("cvxopt")
+    pytest.importorskip(PACKAGES[request.param])
     return request.param
 
 
@@ -85,8 +84,8 @@ def test_symmetric_mirrors_the_lower_triangle(rng):
     np.testing.assert_allclose(symmetric(lower).toarray(), A)
 
 
-def test_superlu_serves_where_cvxopt_is_missing(rng, monkeypatch):
-    monkeypatch.setattr(linear, "find_spec", lambda name: None)
+def test_superlu_serves_where_only_scipy_is(rng, monkeypatch):
+    monkeypatch.setattr(linear, "find_spec", lambda name: name == "scipy" or None)
     assert available_linear_solvers() == [SuperLU]
     assert isinstance(best_linear_solver(positive_definite(rng)[1]), SuperLU)
 

@@ -1,0 +1,54 @@
+"""What each element adds to sums over the mesh; compiled into the loops that call it.
+
+`corners` and `axes` are tuples of k and dim zeros: their lengths are known to the compiler, which
+then unrolls the loops over an element's vertices and material axes.
+"""
+
+from __future__ import annotations
+
+from numba import njit
+
+
+@njit(cache=True)
+def gather(elements, gradients, corners, axes, e, x, F):  # type: ignore[no-untyped-def]
+    """F (dim, 3) = sum_a B_a x_a^T of element e."""
+    for c in range(len(axes)):
+        f0 = f1 = f2 = 0.0
+        for a in range(len(corners)):
+            v, B = elements[e, a], gradients[e, a, c]
+            f0 += B * x[v, 0]
+            f1 += B * x[v, 1]
+            f2 += B * x[v, 2]
+        F[c, 0], F[c, 1], F[c, 2] = f0, f1, f2
+
+
+@njit(cache=True)
+def spread(elements, gradients, corners, axes, e, P, out):  # type: ignore[no-untyped-def]
+    """Add sum_c B_ac P_c, of P (dim, 3), to each vertex a of element e in `out` (n, 3)."""
+    for a in range(len(corners)):
+        v = elements[e, a]
+        for c in range(len(axes)):
+            B = gradients[e, a, c]
+            for i in range(3):
+                out[v, i] += B * P[c, i]
+
+
+@njit(cache=True)
+def spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data):  # type: ignore[no-untyped-def]
+    """Add sum_cf B_ac B_bf H_cf, of H (dim, dim, 3, 3), to the block of each vertex pair a, b.
+
+    `slots`, `stride` and `data` are those of `strainbench.physics.pattern.Pattern`.
+    """
+    for b in range(len(corners)):
+        width = stride[elements[e, b]]
+        for a in range(len(corners)):
+            first = slots[e, a, b]
+            if first < 0:
+                continue
+            for j in range(3):
+                column = first + j * width
+                for c in range(len(axes)):
+                    for f in range(len(axes)):
+                        weight = gradients[e, a, c] * gradients[e, b, f]
+                        for i in range(3):
+                            data[column + i] += weight * H[c, f, i, j]
