@@ -34,6 +34,7 @@ from numba import njit
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
 from strainbench.reference import objective_floor
+from strainbench.warm import Memory
 
 DECREASE, HALVINGS = 1e-4, 20
 """Armijo's condition with its customary factor (Nocedal and Wright 2006, Sec. 3.1)."""
@@ -102,6 +103,7 @@ class AugmentedLagrangian(Solver):
     variants = {"arcsim": {"max_penalty": 1e3, "inner": "cg", "inner_steps": 10, "max_updates": 10}}
     takes_exact = True
 
+    warm: bool = False
     penalty: float = 1e3
     max_penalty: float = 2e4
     inner: str = "newton"
@@ -112,26 +114,31 @@ class AugmentedLagrangian(Solver):
         if self.inner not in ("newton", "cg"):
             raise ValueError(f"inner is {self.inner!r}: valid are newton, cg")
 
-    def prepare(self, problem: Problem) -> Blocks:
+    def prepare(self, problem: Problem) -> Memory[Blocks]:
         """Coefficients, and the compiled loops."""
         G = blocks(problem)
         shape = (problem.constraints, len(G.axes), 3)
         inner = Minimum(G, problem, np.zeros(shape), self.penalty, problem.target)
         inner.newton_step(0)
-        return G
+        return Memory(G, self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Blocks,
+        state: Memory[Blocks],
         *,
         tolerance: float,
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """Updates from the target and Y = 0; the monitor sees inner steps 1, 2, 4, 8, ..."""
-        Y = np.zeros((problem.rows, 3))
-        return self.update(problem, state, problem.target, Y, tolerance, monitor, deadline)
+        """Updates from the target and Y = 0, or from the last answer.
+
+        The monitor sees inner steps 1, 2, 4, 8, ...
+        """
+        x, Y = state.start(problem)
+        return state.keep(
+            problem, self.update(problem, state.mesh, x, Y, tolerance, monitor, deadline)
+        )
 
     def update(
         self,

@@ -41,6 +41,7 @@ from numba import njit
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
 from strainbench.reference import objective_floor
+from strainbench.warm import Memory
 
 ROWS_A_CHUNK = 1_000_000
 """Row visits between two looks at the clock: 30 ms at the 30 ns a visit measured."""
@@ -112,27 +113,30 @@ class Dykstra(Solver):
     takes_exact = True
 
     accelerate: bool = True
+    warm: bool = False
     max_sweeps: int = 1_000_000
 
-    def prepare(self, problem: Problem) -> Blocks:
+    def prepare(self, problem: Problem) -> Memory[Blocks]:
         """Coefficients, step lengths, and the compiled loops."""
         G = blocks(problem)
         frame, run = start(problem, G, np.zeros((problem.rows, 3)))
         judge(G, frame, self._advance(G, frame, run, 0))
-        return G
+        return Memory(G, self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Blocks,
+        state: Memory[Blocks],
         *,
         tolerance: float,
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """Sweeps from Y = 0; the monitor sees about sweeps 2, 4, 8, ..."""
-        multipliers = np.zeros((problem.rows, 3))
-        return self.ascend(problem, state, multipliers, tolerance, monitor, deadline)
+        """Sweeps from Y = 0, or from the last Y; the monitor sees about sweeps 2, 4, 8, ..."""
+        _, Y = state.start(problem)
+        return state.keep(
+            problem, self.ascend(problem, state.mesh, Y, tolerance, monitor, deadline)
+        )
 
     def ascend(
         self,

@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
 from strainbench.problem import IntArray
+from strainbench.warm import Memory
 
 STATUS = {
     0: "solved",
@@ -70,6 +71,7 @@ class Ipopt(Solver):
 
     scaling: str = "scaled"
     hessian: str = "exact"
+    warm: bool = False
 
     def __post_init__(self) -> None:
         if self.scaling not in ("scaled", "default"):
@@ -82,14 +84,14 @@ class Ipopt(Solver):
         g = problem.row_coefficients
         return Rows(problem.row_vertices, g, problem.lower_bounds, problem.bounds)
 
-    def prepare(self, problem: Problem) -> Structure:
+    def prepare(self, problem: Problem) -> Memory[Structure]:
         """The sparsity of the derivatives."""
-        return Structure(problem, self.rows(problem))
+        return Memory(Structure(problem, self.rows(problem)), self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Structure,
+        state: Memory[Structure],
         *,
         tolerance: float,
         monitor: Callable[..., None],
@@ -97,29 +99,36 @@ class Ipopt(Solver):
     ) -> Solution:
         """One run of Ipopt."""
         unit, scale = self._units(problem)
-        nlp = Callbacks(problem, state, unit, scale, monitor, deadline)
-        start = problem.target[problem.free].ravel() / unit
+        nlp = Callbacks(problem, state.mesh, unit, scale, monitor, deadline)
+        positions, Y = state.start(problem)
+        start = positions[problem.free].ravel() / unit
         if start.size == 0:
             return Solution(problem.target.copy(), "solved", 0)
+        rows, options, given = state.mesh.rows, self._options(tolerance, deadline), {}
+        if np.any(Y):
+            options["warm_start_init_point"] = "yes"
+            y = nlp.stretched(start)
+            given["lagrange"] = scale / 2 * np.sum(Y * y, axis=1) / np.sum(y**2, axis=1)
         ipopt = cyipopt.Problem(
             n=start.size,
-            m=len(state.rows.bounds),
+            m=len(rows.bounds),
             problem_obj=nlp,
-            cl=np.where(state.rows.lower > 0, state.rows.lower**2, -np.inf),
-            cu=state.rows.bounds**2,
+            cl=np.where(rows.lower > 0, rows.lower**2, -np.inf),
+            cu=rows.bounds**2,
         )
-        for option, value in self._options(tolerance, deadline).items():
+        for option, value in options.items():
             ipopt.add_option(option, value)
-        x, info = ipopt.solve(start)
+        x, info = ipopt.solve(start, **given)
         code = info["status"]
         if code not in ANSWERS:
             x = np.full_like(start, np.nan)
-        return Solution(
+        solution = Solution(
             nlp.positions(x),
             STATUS.get(code, f"Ipopt status {code}"),
             nlp.iterations,
             2 / scale * info["mult_g"][:, None] * nlp.stretched(x),
         )
+        return state.keep(problem, solution)
 
     def _units(self, problem: Problem) -> tuple[float, float]:
         """The unit of length [m], and the factor s of the objective."""

@@ -24,6 +24,7 @@ import numpy as np
 from solvers.ipopt import Ipopt, Rows, Structure
 from strainbench import Clock, Problem, Solution, StretchLimits
 from strainbench.problem import longest_edges
+from strainbench.warm import Memory
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class IpoptEdges(Ipopt):
     def solve(
         self,
         problem: Problem,
-        state: Structure,
+        state: Memory[Structure],
         *,
         tolerance: float,
         monitor: Callable[..., None],

@@ -32,6 +32,7 @@ import scipy.sparse as sp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
 from strainbench.reference import objective_floor, verify
+from strainbench.warm import Memory
 
 ITERATIONS = 1000
 RHO = 100.0
@@ -68,34 +69,43 @@ class LinearizedQP(Solver):
 
     curvature: bool = True
     settings: str = "tuned"
+    warm: bool = False
     max_steps: int = 50
 
     def __post_init__(self) -> None:
         if self.settings not in ("tuned", "default"):
             raise ValueError(f"settings is {self.settings!r}: valid are tuned, default")
 
-    def prepare(self, problem: Problem) -> sp.csr_array:
+    def prepare(self, problem: Problem) -> Memory[sp.csr_array]:
         """G on the free vertices, for the three coordinates."""
-        return sp.csr_array(sp.kron(problem.G[:, problem.free], sp.eye_array(3)))
+        G = sp.csr_array(sp.kron(problem.G[:, problem.free], sp.eye_array(3)))
+        return Memory(G, self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: sp.csr_array,
+        state: Memory[sp.csr_array],
         *,
         tolerance: float,
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """Steps from the target with no multipliers."""
+        """Steps from the target with no multipliers, or from the last answer."""
         if not np.any(problem.violations(problem.target)) or len(problem.free) == 0:
-            return Solution(problem.target.copy(), "solved", 0, np.zeros((problem.rows, 3)))
-        steps = Steps(self, problem, state, problem.target, np.zeros(problem.rows))
+            nothing = np.zeros((problem.rows, 3))
+            return state.keep(problem, Solution(problem.target.copy(), "solved", 0, nothing))
+        x, Y = state.start(problem)
+        steps = Steps(self, problem, state.mesh, x, np.linalg.norm(Y, axis=1))
+        return state.keep(problem, self._run(steps, tolerance, monitor, deadline))
+
+    def _run(
+        self, steps: Steps, tolerance: float, monitor: Callable[..., None], deadline: Clock
+    ) -> Solution:
         for step in range(1, self.max_steps + 1):
             status = steps.take(tolerance, deadline)
             monitor(steps.x.copy(), steps.Y)
             if "infeasible" in status:
-                steps.x[problem.free] = np.nan
+                steps.x[steps.problem.free] = np.nan
                 return Solution(steps.x, status, step)
             if steps.converged(tolerance):  # 3
                 return Solution(steps.x, "solved", step, steps.Y)

@@ -37,6 +37,7 @@ from numba import njit
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
+from strainbench.warm import Memory
 
 ROWS_A_CHUNK = 3_000_000
 """Row visits between two looks at the clock: 30 ms at the 10 ns a visit measured."""
@@ -88,31 +89,33 @@ class Xpbd(Solver):
     max_sweeps: int = 100_000
     compliance: float = 0.0
     clamped: bool = False
+    warm: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.compliance < float("inf"):
             raise ValueError(f"compliance is {self.compliance}: a number of at least 0 is valid")
 
-    def prepare(self, problem: Problem) -> Rows:
+    def prepare(self, problem: Problem) -> Memory[Rows]:
         """Coefficients, and the compiled loops."""
         G, g = rows(problem), np.zeros(problem.rows)
         x = problem.target.copy()
         sweep(G, problem.bounds, x, g, 0.0, self.clamped, 1.0, 0)
         largest_violation(G, problem.bounds, x)
-        return G
+        return Memory(G, self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Rows,
+        state: Memory[Rows],
         *,
         tolerance: float,
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """Sweeps from the target; the monitor sees sweeps 1, 2, 4, 8, ..."""
-        x, multipliers = problem.target.copy(), np.zeros(problem.rows)
-        return self.relax(problem, state, x, multipliers, tolerance, monitor, deadline)
+        """Sweeps from the target, or the last answer; the monitor sees sweeps 1, 2, 4, 8, ..."""
+        (x, _), l = state.start(problem), np.zeros(problem.rows)  # noqa: E741
+        solution = self.relax(problem, state.mesh, x, l, tolerance, monitor, deadline)
+        return state.keep(problem, solution)
 
     def relax(
         self,

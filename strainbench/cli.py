@@ -26,7 +26,7 @@ from strainbench.cell import Cell
 from strainbench.discovery import Entry, list_scenarios, list_solvers
 from strainbench.export import check_format, write_problem
 from strainbench.frame import record, recorder
-from strainbench.plan import plan, plan_one, plan_scene
+from strainbench.plan import never_warm, plan, plan_one, plan_scene
 from strainbench.problem import Problem
 from strainbench.records import RecordsError
 from strainbench.reference import REFERENCE_SOLVER
@@ -90,6 +90,9 @@ def run(
     mode: Annotated[str, typer.Option(help="simulate (closed loop) or replay (same frames)")] = (
         "simulate"
     ),
+    start: Annotated[
+        str, typer.Option(help="cold, warm (from the frame before, where a solver can) or cold,warm")
+    ] = "cold",
     tolerance: Annotated[str, typer.Option(help="aimed at by every solver; 1e-3,1e-6 for two")] = (
         "1e-6"
     ),
@@ -126,7 +129,11 @@ def run(
         _numbers(tolerance),
         time_limit,
         duration,
+        start.split(","),
     )
+    if "cold" not in start and (cold := never_warm(solver or ["all"])):
+        left_out = f"left out, as they cannot start warm: {', '.join(cold)}"
+        console.print(left_out, highlight=False, markup=False, soft_wrap=True)
     memory = memory_limit or 0.75 * psutil.virtual_memory().total / 1024**2 / jobs
     settings = Settings(results, jobs, threads, memory, rerun)
     with Display() as display:

@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import TypeVar
 
 from strainbench.scenario import Scenario
-from strainbench.solver import Solver, method_and_paper
+from strainbench.solver import Solver, method_and_paper, warm_twin
 
 OURS = ("strainbench", "solvers", "scenarios")
 Plugin = TypeVar("Plugin", Solver, Scenario)
@@ -90,6 +90,14 @@ def _variants(solver: type[Solver]) -> Iterator[Solver]:
         yield solver(**settings)
 
 
+def _with_twins(solver: type[Solver]) -> Iterator[Solver]:
+    """The variants, and those that start warm."""
+    for variant in _variants(solver):
+        yield variant
+        if variant.starts_warm is False:
+            yield warm_twin(variant)
+
+
 def list_solvers() -> list[Entry]:
     """Every solver and variant, with the reason where one is unavailable."""
     entries = []
@@ -112,7 +120,7 @@ def list_scenarios() -> list[Entry]:
 
 
 def _ours(name: str) -> Solver | None:
-    """Our solver or variant of that name, importing no more than may hold it."""
+    """Our solver, variant or warm twin of that name, importing no more than may hold it."""
     for stem in sorted(_stems("solvers"), key=len, reverse=True):
         if name != stem.replace("_", "-") and not name.startswith(stem.replace("_", "-") + "-"):
             continue
@@ -120,7 +128,7 @@ def _ours(name: str) -> Solver | None:
             module = _load("solvers", stem)
         except UnavailableError as error:
             raise UnavailableError(f"solver {name} is unavailable: {error}") from error
-        for solver in (v for c in _classes(module, Solver) for v in _variants(c)):
+        for solver in (v for c in _classes(module, Solver) for v in _with_twins(c)):
             if solver.label == name:
                 if missing := solver.missing():
                     raise UnavailableError(f"solver {name} is unavailable: {missing}")
@@ -129,7 +137,7 @@ def _ours(name: str) -> Solver | None:
 
 
 def find_solver(name: str) -> Solver:
-    """The solver of a name or of a variant's name.
+    """The solver of a name or of a variant's name, and with "-warm", its warm twin.
 
     Raises
     ------

@@ -18,9 +18,10 @@ from strainbench.discovery import (
     load_file,
 )
 from strainbench.scenario import Scenario
-from strainbench.solver import Solver
+from strainbench.solver import Solver, warm_twin
 
 MODES = ("simulate", "replay")
+STARTS = ("cold", "warm")
 Choices = dict[str, dict[str, list[str]]]
 """Values by owner ("" where none was named) and key."""
 
@@ -91,7 +92,9 @@ def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
     return refs
 
 
-def plan_solvers(words: Sequence[str], choices: Choices) -> list[PluginRef]:
+def plan_solvers(
+    words: Sequence[str], choices: Choices, starts: Sequence[str]
+) -> list[PluginRef]:
     """The solvers named, or given as files; "all" is every one of ours, unavailable ones too."""
     names = [n for w in words for n in ([w] if is_file(w) else w.split(","))]
     if "all" in names:
@@ -103,10 +106,24 @@ def plan_solvers(words: Sequence[str], choices: Choices) -> list[PluginRef]:
         try:
             found = from_file(name) if path else [find_solver(name)]
         except UnavailableError as error:
-            refs.append(PluginRef(name, name, unavailable=str(error)))
+            refs += [PluginRef(name, name, unavailable=str(error))] if "cold" in starts else []
             continue
-        refs += [PluginRef.of(v, path) for s in found for v in variations(s, choices, False)]
+        varied = [v for s in found for v in variations(s, choices, False)]
+        refs += [PluginRef.of(v, path) for s in varied for v in by_start(s, starts)]
     return list(dict.fromkeys(refs))
+
+
+def by_start(solver: Solver, starts: Sequence[str]) -> list[Solver]:
+    """The solver as it was named for "cold", and its warm twin, if it has one, for "warm"."""
+    cold = [solver] if "cold" in starts else []
+    can = solver.starts_warm is not None and "warm" in starts
+    return [*cold, warm_twin(solver)] if can else cold
+
+
+def never_warm(solvers: Sequence[str]) -> list[str]:
+    """The names of those solvers that have no warm twin."""
+    refs = plan_solvers(solvers, {}, ("cold",))
+    return [ref.label for ref in refs if "warm" not in dict(ref.parameters)]
 
 
 def from_file(path: str) -> list[Solver]:
@@ -137,8 +154,13 @@ def plan(
     tolerances: Sequence[float],
     time_limit: float | None,
     duration: float | None = None,
+    starts: Sequence[str] = ("cold",),
 ) -> list[Cell]:
     """All cells of a run; with a `duration` [s] each has its own number of steps, and not `steps`.
+
+    Parameters
+    ----------
+    starts : of STARTS; solvers that cannot start warm do so "cold" alone, see `never_warm`.
 
     Raises
     ------
@@ -154,9 +176,13 @@ def plan(
         for value in values:
             if value is not None and not 0 < value < float("inf"):
                 raise ValueError(f"{name} {value}: a number above 0 is valid")
+    if not starts or not set(starts) <= set(STARTS):
+        raise ValueError(f"--start {','.join(starts)}: valid are cold, warm and cold,warm")
     choices = parse_settings(settings)
     scenes = plan_scenarios(scenarios, choices)
-    methods = plan_solvers(solvers, choices)
+    methods = plan_solvers(solvers, choices, starts)
+    if not methods:
+        raise ValueError(f"--start warm: {', '.join(solvers)} cannot start from the frame before")
     owners = {ref.name for ref in [*scenes, *methods]}
     for owner in choices:
         if owner and owner not in owners:

@@ -97,6 +97,8 @@ class Solver(ABC):
     The first line of the docstring reads "method (paper)"; `strainbench list` shows both.
     `name` is lower case with hyphens. `variants` names other settings worth showing beside the
     defaults: {"default": {"scaling": "default"}} adds the solver `<name>-default`.
+    A field `warm: bool = False` says that the method can start from the frame before, which it
+    then keeps in its `state` (`strainbench.warm`): `--start warm` sets it.
     `takes_exact` says that the method has a form for exact limits, `takes_lower` that it has one
     for lower bounds, which are not convex.
     """
@@ -140,13 +142,24 @@ class Solver(ABC):
         """
 
     @property
+    def starts_warm(self) -> bool | None:
+        """Whether it starts from the frame before; None where it cannot."""
+        warm = self.parameters.get("warm")
+        return warm if isinstance(warm, bool) else None
+
+    @property
     def parameters(self) -> dict[str, object]:
         """The fields and their values."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     @property
     def label(self) -> str:
-        """The name, with the variant's where one matches, else with what differs from default."""
+        """The name, with the variant's where one matches, else with what differs from default.
+
+        A solver that starts warm has its cold twin's label and "-warm".
+        """
+        if self.starts_warm:
+            return replace(self, warm=False).label + "-warm"  # type: ignore[call-arg]
         default = type(self)().parameters
         changed = {k: v for k, v in self.parameters.items() if v != default[k]}
         if not changed:
@@ -155,6 +168,11 @@ class Solver(ABC):
             if changed == {k: v for k, v in settings.items() if v != default[k]}:
                 return f"{self.name}-{variant}"
         return self.name + "[" + ",".join(f"{k}={v}" for k, v in changed.items()) + "]"
+
+
+def warm_twin(solver: Solver) -> Solver:
+    """The same, starting from the frame before."""
+    return replace(solver, warm=True)  # type: ignore[call-arg]
 
 
 def run_solver(

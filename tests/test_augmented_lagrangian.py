@@ -91,7 +91,7 @@ def test_arcsims_counts_end_anywhere():
 def test_it_goes_on_from_a_given_point():
     problem = random_problem(np.random.default_rng(11), directions=4, limit=0.02)
     solver, clock = AugmentedLagrangian(), Clock()
-    state = solver.prepare(problem)
+    state = solver.prepare(problem).mesh
     cold = solve(problem, solver)
     start = (cold.positions, cold.multipliers)
     warm = solver.update(problem, state, *start, 1e-6, clock.monitor, clock)

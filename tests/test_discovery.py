@@ -134,7 +134,7 @@ def test_an_unavailable_solver_is_listed_with_the_reason(without_clarabel):
 
 
 def test_an_unavailable_solver_is_planned_with_the_reason(without_clarabel):
-    ours, other = plan_solvers(["clarabel", "none"], {})
+    ours, other = plan_solvers(["clarabel", "none"], {}, ("cold",))
     assert ours.name == "clarabel"
     assert "needs clarabel" in ours.unavailable
     assert other.unavailable is None

@@ -70,7 +70,7 @@ def test_the_dual_objective_never_falls(exact, accelerate):
 def test_it_goes_on_from_given_multipliers():
     problem = random_problem(np.random.default_rng(11), directions=4, limit=0.02)
     solver, clock = Dykstra(), Clock()
-    state = solver.prepare(problem)
+    state = solver.prepare(problem).mesh
     cold = solve(problem, solver)
     warm = solver.ascend(problem, state, cold.multipliers, 1e-6, clock.monitor, clock)
     assert cold.iterations > warm.iterations == 0

@@ -7,7 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strainbench import Problem, StretchLimits, certify, solve
-from strainbench.discovery import UnavailableError, find_solver, list_solvers
+from strainbench.discovery import UnavailableError, find_scenario, find_solver, list_solvers
+from strainbench.reference import reference_of
+from strainbench.solver import run_solver, warm_twin
 from tests.problems import random_problem
 
 NAMES = [e.name for e in list_solvers() if not e.unavailable]
@@ -47,6 +49,11 @@ UNSCALED = [
     "qoco-default",
 ]
 """Out of the box: an objective known to 1e-8 of its size leaves positions uncertain by 1e-4."""
+
+CAN_START_WARM = [
+    n for n in LIMITING if find_solver(n).starts_warm is not None and n not in UNSCALED
+]
+"""Unscaled ones lose themselves on the swing, warm or not."""
 
 
 def exactness(name):
@@ -184,3 +191,70 @@ def test_iterates_are_shown_with_the_iterations_that_they_took(name):
     assert list(seconds) == sorted(seconds)
     if shown:
         assert counts[-1] <= solution.iterations <= 2 * counts[-1] + 1
+
+
+# --- warm starts
+
+
+@pytest.fixture(scope="module")
+def frames():
+    """The swing's first ten projections at 6 cells, and their optima; the first is feasible."""
+    scene, problems = find_scenario("swing")(resolution=6), []
+    problem = scene.problem()
+    reference = find_solver("newton-ipm")
+    state = reference.prepare(problem)
+
+    def project(target):
+        problems.append(problem.with_target(target))
+        return run_solver(reference, problems[-1], state, 1e-6).positions
+
+    for step, _ in enumerate(scene.play(project), start=1):
+        if step == 10:
+            return [(frame, reference_of(frame)) for frame in problems]
+
+
+@pytest.mark.parametrize("name", CAN_START_WARM)
+def test_warm_answers_are_as_good_as_cold_ones(name, frames):
+    cold = available(name)
+    warm = warm_twin(cold)
+    states, totals = (cold.prepare(frames[0][0]), warm.prepare(frames[0][0])), [0, 0]
+    for frame, optimum in frames:
+        for k, solver in enumerate((cold, warm)):
+            solution = run_solver(solver, frame, states[k], 1e-6)
+            found = certify(frame, solution.positions, reference=optimum)
+            outcomes = ["optimal"] if name in TO_OPTIMALITY else ["optimal", "feasible"]
+            assert found.outcome in outcomes, (solver.label, found.reason, solution.status)
+            totals[k] += solution.iterations
+    assert totals[1] < totals[0]
+
+
+@pytest.mark.parametrize("name", CAN_START_WARM)
+def test_nothing_leaks_between_frames_but_into_a_warm_start(name, frames):
+    cold, (first, _), (second, _) = available(name), frames[6], frames[9]
+    state = cold.prepare(first)
+    alone, _, again = [run_solver(cold, p, state, 1e-6) for p in (first, second, first)]
+    assert np.array_equal(alone.positions, again.positions)
+    warm = warm_twin(cold)
+    state = warm.prepare(first)
+    alone_warm, again_warm = [run_solver(warm, first, state, 1e-6) for _ in range(2)]
+    assert np.array_equal(alone_warm.positions, alone.positions)
+    assert again_warm.iterations < alone_warm.iterations
+
+
+@pytest.mark.parametrize("name", CAN_START_WARM)
+def test_a_warm_start_survives_an_absurd_frame_before(name, frames):
+    warm, (frame, optimum) = warm_twin(available(name)), frames[9]
+    scattered = 0.3 * np.random.default_rng(0).normal(size=frame.target.shape)
+    scattered[frame.pinned] = frame.target[frame.pinned]
+    state = warm.prepare(frame)
+    run_solver(warm, frame.with_target(scattered + [100.0, 0.0, 0.0]), state, 1e-6)
+    found = certify(frame, run_solver(warm, frame, state, 1e-6).positions, reference=optimum)
+    assert found.outcome in (["optimal"] if name in TO_OPTIMALITY else ["optimal", "feasible"])
+
+
+@pytest.mark.parametrize("name", CAN_START_WARM)
+def test_a_warm_twin_has_a_name_of_its_own(name):
+    twin = find_solver(f"{name}-warm")
+    assert twin == warm_twin(available(name))
+    assert twin.label == f"{name}-warm"
+    assert twin.label not in NAMES

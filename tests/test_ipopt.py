@@ -19,7 +19,7 @@ EQUILATERAL = np.array([[0.0, 0.0], [1.0, 0.0], [0.5, 0.75**0.5]])
 
 
 def callbacks(solver, problem):
-    return Callbacks(problem, solver.prepare(problem), 0.3, 7.0, lambda x: None, Clock())
+    return Callbacks(problem, solver.prepare(problem).mesh, 0.3, 7.0, lambda x: None, Clock())
 
 
 def dense(structure, values, shape):

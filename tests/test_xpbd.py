@@ -69,7 +69,7 @@ def test_multipliers_push_inwards_only(clamped):
 def test_it_goes_on_from_a_given_point():
     problem = problem_of(9)
     solver, clock = Xpbd(), Clock()
-    state, x, l = solver.prepare(problem), problem.target.copy(), np.zeros(problem.rows)  # noqa: E741
+    state, x, l = solver.prepare(problem).mesh, problem.target.copy(), np.zeros(problem.rows)  # noqa: E741
     whole = solver.relax(problem, state, x, l, 1e-6, clock.monitor, clock)
     again = solver.relax(problem, state, x, l, 1e-6, clock.monitor, clock)
     assert whole.iterations > again.iterations == 0

@@ -32,6 +32,7 @@ from solvers.admm.rows import Rows
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
 from strainbench.reference import objective_floor
+from strainbench.warm import Memory
 
 LOOK = 10
 """Iterations between two tests for the end, each as dear as half an iteration."""
@@ -75,6 +76,7 @@ class Admm(Solver):
     weights: str = "bound"
     relaxation: float = 1.8
     memory: int = 0
+    warm: bool = False
     max_iterations: int = 100_000
 
     def __post_init__(self) -> None:
@@ -83,26 +85,26 @@ class Admm(Solver):
         if not 0 < self.relaxation < 2:
             raise ValueError(f"relaxation is {self.relaxation}: a number between 0 and 2 is valid")
 
-    def prepare(self, problem: Problem) -> Rows:
+    def prepare(self, problem: Problem) -> Memory[Rows]:
         """Sparsity, ordering, and the compiled loops."""
-        return Rows(problem)
+        return Memory(Rows(problem), self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Rows,
+        state: Memory[Rows],
         *,
         tolerance: float,
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """Iterations from the target with no multipliers."""
-        nothing = np.zeros((problem.rows, 3))
+        """Iterations from the target with no multipliers, or from the last answer."""
         if not np.any(problem.violations(problem.target)) or len(problem.free) == 0:
-            return Solution(problem.target.copy(), "solved", 0, nothing)
-        iteration = Iteration(self, problem, state, problem.target, nothing)
+            nothing = np.zeros((problem.rows, 3))
+            return state.keep(problem, Solution(problem.target.copy(), "solved", 0, nothing))
+        iteration = Iteration(self, problem, state.mesh, *state.start(problem))
         status, done = iteration.run(tolerance, monitor, deadline)
-        return Solution(iteration.x, status, done, iteration.multipliers)
+        return state.keep(problem, Solution(iteration.x, status, done, iteration.multipliers))
 
 
 class Iteration:

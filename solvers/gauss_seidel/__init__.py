@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from solvers.gauss_seidel.elements import Elements, refusal
 from solvers.gauss_seidel.rows import Rows
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.warm import Memory
 
 VISITS_A_CHUNK = 3_000_000
 """Constraint visits between two looks at the clock: 20 ms at the 6 to 7 ns a row measured."""
@@ -51,6 +52,7 @@ class GaussSeidel(Solver):
 
     constraint: str = "directions"
     max_sweeps: int = 100_000
+    warm: bool = False
 
     def __post_init__(self) -> None:
         if self.constraint not in ("directions", "strain", "principal"):
@@ -61,24 +63,24 @@ class GaussSeidel(Solver):
         """A reason, where the limits cannot be put as limits on what one step corrects."""
         return super().supports(problem) or refusal(self.constraint, problem)
 
-    def prepare(self, problem: Problem) -> Rows | Elements:
+    def prepare(self, problem: Problem) -> Memory[Rows | Elements]:
         """What a step needs that does not depend on the positions, and the compiled loops."""
         by_rows = self.constraint == "directions"
-        state = Rows.of(problem) if by_rows else Elements.of(problem, self.constraint == "strain")
-        state.sweep(problem, problem.target.copy(), 1.0, 0)
-        return state
+        mesh = Rows.of(problem) if by_rows else Elements.of(problem, self.constraint == "strain")
+        mesh.sweep(problem, problem.target.copy(), 1.0, 0)
+        return Memory(mesh, self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Rows | Elements,
+        state: Memory[Rows | Elements],
         *,
         tolerance: float,
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """Sweeps from the target; the monitor sees sweeps 1, 2, 4, 8, ..."""
-        x = problem.target.copy()
+        """Sweeps from the target, or the last answer; the monitor sees sweeps 1, 2, 4, 8, ..."""
+        x, _ = state.start(problem)
         done, mark = 0, 1
         chunk = max(1, VISITS_A_CHUNK // problem.rows)
         while not problem.violations(x).max() < tolerance:
@@ -87,8 +89,8 @@ class GaussSeidel(Solver):
             if deadline.passed:
                 return Solution(x, "time limit", done)
             sweeps = min(mark - done, chunk, self.max_sweeps - done)
-            done += state.sweep(problem, x, tolerance, sweeps)
+            done += state.mesh.sweep(problem, x, tolerance, sweeps)
             if done == mark:
                 monitor(x.copy(), iterations=done)
                 mark *= 2
-        return Solution(x, "solved", done)
+        return state.keep(problem, Solution(x, "solved", done))

@@ -83,7 +83,6 @@ best iterate is returned |
 
     name = "newton-ipm"
     takes_exact = True
-    variants = {"warm": {"warm": True}}
 
     warm: bool = False
     max_iterations: int = 200

@@ -9,6 +9,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
+from strainbench.report import warm
 from strainbench.report.table import (
     accuracy_text,
     details,
@@ -38,6 +39,9 @@ def write_page(
         charts=[Markup(svg[svg.index("<svg") :]) for svg in drawings],
         explanation=explanation(runs).replace("`", "").replace("**", ""),
         groups=list(groups(runs)),
+        twins=[pair.line() for pair in warm.pairs(runs)],
+        twins_header=warm.HEADER,
+        twins_explanation=warm.EXPLANATION.replace("`", ""),
         time_text=time_text,
         accuracy_text=accuracy_text,
         reasons=reasons(runs),

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from strainbench.report import warm
+
 GROUP = ["scenario", "mode", "setting", "tolerance", "steps_asked"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
 EXPLANATION = """\
@@ -42,11 +44,12 @@ class Group:
         """(limit, solver, row or None for each resolution), implicit Euler left out."""
         constrained = self.runs[self.runs["solver"] != UNCONSTRAINED]
         for limit, block in constrained.groupby("limit"):
-            for solver, rows in block.groupby("solver", sort=False):
+            for solver in warm.beside_twins(list(block["solver"].unique())):
+                rows = block[block["solver"] == solver]
                 by_resolution = {int(r["resolution"]): r for _, r in rows.iterrows()}
                 yield (
                     f"{100 * limit:g}%",
-                    str(solver),
+                    solver,
                     [by_resolution.get(n) for n in self.resolutions],
                 )
 
@@ -179,6 +182,10 @@ def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
     """All tables, what their signs mean, the reasons of every failure, the machine."""
     parts = ["# Table 1: seconds a projection, and the accuracy reached", explanation(runs)]
     parts += [_markdown_group(group) for group in groups(runs)]
+    if twins := warm.pairs(runs):
+        lines = [_line(list(warm.HEADER)), _line(["---"] * len(warm.HEADER))]
+        lines += [_line(list(pair.line())) for pair in twins]
+        parts.append("## Cold and warm starts\n\n" + warm.EXPLANATION + "\n\n" + "\n".join(lines))
     if lines := [f"- {reason}" for reason in reasons(runs)]:
         parts.append("## What kept a cell from optimal\n\n" + "\n".join(lines))
     if lines := [f"- {line}" for line in details(runs)]:

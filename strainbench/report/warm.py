@@ -1,0 +1,62 @@
+"""Cold and warm starts of the same method side by side."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+
+import pandas as pd
+
+HEADER = ("scene", "limit", "method", "seconds, cold / warm", "iterations", "distance [mm]")
+EXPLANATION = """\
+Ratio of the medians of seconds a projection, cold over warm; mean iterations and largest distance
+to the optimum, cold and warm. In `simulate` each start has frames of its own, in `replay` both
+have the same."""
+SUFFIX = "-warm"
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A cold cell and its warm twin, rows of runs.csv."""
+
+    cold: pd.Series
+    warm: pd.Series
+
+    def line(self) -> tuple[str, ...]:
+        """The entries of HEADER."""
+        cold, warm = self.cold, self.warm
+        ratio = cold["solve_seconds_median"] / warm["solve_seconds_median"]
+        iterations = [f"{r['iterations_mean']:.4g}" for r in (cold, warm)]
+        distances = [f"{1000 * r['distance_max']:.2g}" for r in (cold, warm)]
+        return (
+            f"{cold['scenario']} {cold['resolution']:.0f}, {cold['mode']}",
+            f"{100 * cold['limit']:g}%",
+            str(cold["solver"]),
+            f"{ratio:.2f}",
+            " → ".join(iterations),
+            " → ".join(distances),
+        )
+
+
+def starts_warm(run: pd.Series) -> bool:
+    """Whether a row's solver started from the frame before."""
+    return json.loads(run["solver_parameters"] or "{}").get("warm") is True
+
+
+def pairs(runs: pd.DataFrame) -> list[Pair]:
+    """The cells that ran both ways, to the end."""
+    same = ["scenario", "mode", "scenario_parameters", "tolerance", "steps_asked"]
+    done = runs[runs["steps_done"] == runs["steps_asked"]]
+    cold = {(*r[same], r["solver"]): r for _, r in done.iterrows() if not starts_warm(r)}
+    warm = [r for _, r in done.iterrows() if starts_warm(r)]
+    keys = [(*r[same], r["solver"].removesuffix(SUFFIX)) for r in warm]
+    return [Pair(cold[k], r) for k, r in zip(keys, warm, strict=True) if k in cold]
+
+
+def beside_twins(solvers: list[str]) -> list[str]:
+    """Names in their order, each warm twin right after its cold one."""
+    first = {name: place for place, name in reversed(list(enumerate(solvers)))}
+    return sorted(
+        solvers,
+        key=lambda n: (first.get(n.removesuffix(SUFFIX), first[n]), n.endswith(SUFFIX)),
+    )
