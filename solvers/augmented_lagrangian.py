@@ -93,6 +93,9 @@ class AugmentedLagrangian(Solver):
         cells, 1% and 0.1%, and 40 at 1%: from 1e3, as ARCSim, up to 2e4 takes 0.3 to 1.5 times
         the time of a fixed mu from 1e3 to 1e4; with 100, some did not end in 10 s. L-BFGS took 2 to
         3 times as long as Newton-CG.
+    warm : start from the frame before: its multipliers, and its positions moved as the target has
+        moved. On frames 10 to 30 of the swing at 20 cells, 1%, 180 steps become 89 (medians); to
+        carry mu over too takes up to 1.5 times as many.
     inner : "newton" for step 2, or "cg" for nonlinear conjugate gradients, with beta =
         max(0, min(Hestenes-Stiefel, Dai-Yuan)) and the step length of one Newton step along p.
     inner_steps : to an update, at most.

@@ -62,6 +62,8 @@ class LinearizedQP(Solver):
         (a factorisation of its own a step; the iterations get as far), its step size carried from
         step to step, and tolerances that follow the violation. Tuned on four frames of the swing
         at 10 and 20 cells, 1% and 0.1%: four times as fast as OSQP at 1e-7 with the rest default.
+    warm : start from the frame before: its multipliers, and its positions moved as the target has
+        moved. On frames 10 to 30 of the swing at 20 cells, 1%, 9 steps become 3 (medians).
     """
 
     name = "linearized-qp"

@@ -78,6 +78,10 @@ class Xpbd(Solver):
     compliance : a_i over 4 b_i^2 sum_k w_k g_k^2: a row alone is left with this part of its
         C_i, nearly; it never meets its limit. The variant "compliant" has 1e-3 and 100 sweeps.
     clamped : l_i >= 0 in place of step 1.
+    warm : start from the frame before: its positions, moved as the target has moved, and l = 0.
+        As in `gauss-seidel`, the errors of all frames add up: on frames 10 to 30 of the swing at
+        20 cells, 1%, 7,844 sweeps in place of 12,877 (medians), the farthest vertex 21 mm from the
+        optimum in place of 5.
     """
 
     name = "xpbd"

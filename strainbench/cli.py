@@ -91,7 +91,8 @@ def run(
         "simulate"
     ),
     start: Annotated[
-        str, typer.Option(help="cold, warm (from the frame before, where a solver can) or cold,warm")
+        str,
+        typer.Option(help="cold, warm (from the frame before, where a solver can) or cold,warm"),
     ] = "cold",
     tolerance: Annotated[str, typer.Option(help="aimed at by every solver; 1e-3,1e-6 for two")] = (
         "1e-6"

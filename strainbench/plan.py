@@ -92,9 +92,7 @@ def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
     return refs
 
 
-def plan_solvers(
-    words: Sequence[str], choices: Choices, starts: Sequence[str]
-) -> list[PluginRef]:
+def plan_solvers(words: Sequence[str], choices: Choices, starts: Sequence[str]) -> list[PluginRef]:
     """The solvers named, or given as files; "all" is every one of ours, unavailable ones too."""
     names = [n for w in words for n in ([w] if is_file(w) else w.split(","))]
     if "all" in names:

@@ -14,7 +14,9 @@ from tests.problems import central_difference, random_problem
 def test_curvature_is_the_hessian_of_the_limits(rng):
     problem = random_problem(rng, vertices=12, pins=1, directions=2)
     method = LinearizedQP()
-    steps = Steps(method, problem, method.prepare(problem).mesh, problem.target, np.zeros(problem.rows))
+    steps = Steps(
+        method, problem, method.prepare(problem).mesh, problem.target, np.zeros(problem.rows)
+    )
     lengths = rng.uniform(0.5, 2, problem.rows)
 
     def gradient(x):

