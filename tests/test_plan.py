@@ -9,7 +9,7 @@ import pytest
 
 from strainbench.cell import Cell, PluginRef
 from strainbench.discovery import find_scenario, find_solver
-from strainbench.plan import parse_settings, parse_value, plan
+from strainbench.plan import never_warm, parse_settings, parse_value, plan
 
 SOLVER = '''
 from dataclasses import dataclass
@@ -333,3 +333,51 @@ def test_cells_can_be_counted_and_compared(mine):
     words = {"solvers": [str(mine), "clarabel"]}
     assert set(cells(**words)) == set(cells(**words))
     assert all(isinstance(cell, Cell) for cell in cells(**words))
+
+
+# --- starts
+
+
+def labels(solvers, *starts, **changes):
+    return [cell.solver.label for cell in cells(solvers=solvers, starts=starts, **changes)]
+
+
+def test_warm_twins_stand_beside_the_solvers_that_have_one():
+    names = ["dykstra-plain", "clarabel"]
+    assert labels(names, "cold") == names
+    assert labels(names, "cold", "warm") == ["dykstra-plain", "dykstra-plain-warm", "clarabel"]
+    assert labels(names, "warm") == ["dykstra-plain-warm"]
+    assert never_warm(names) == ["clarabel"]
+
+
+def test_a_warm_twin_is_found_by_its_name_and_another_cell():
+    assert labels(["newton-ipm-warm"], "cold") == ["newton-ipm-warm"]
+    assert labels(["newton-ipm-warm", "newton-ipm"], "cold", "warm") == [
+        "newton-ipm-warm",
+        "newton-ipm",
+    ]
+    cold, warm = cells(solvers=["newton-ipm"], starts=("cold", "warm"))
+    assert cold.key != warm.key
+    assert warm.solver.solver() == replace(cold.solver.solver(), warm=True)
+
+
+def test_a_warm_twin_keeps_the_other_settings():
+    settings = ["dykstra.max_sweeps=7"]
+    assert labels(["dykstra"], "warm", settings=settings) == ["dykstra[max_sweeps=7]-warm"]
+
+
+def test_a_file_may_define_a_solver_that_starts_warm(mine):
+    mine.write_text(SOLVER.replace("exact: bool", "warm: bool"))
+    warm = cells(solvers=[str(mine)], starts=("warm",))[0].solver
+    assert (warm.label, warm.solver().warm) == ("mine-warm", True)
+
+
+@pytest.mark.parametrize("starts", [("hot",), ("cold", ""), ()])
+def test_a_wrong_start_is_named(starts):
+    with pytest.raises(ValueError, match=r"--start .*cold, warm and cold,warm"):
+        cells(starts=starts)
+
+
+def test_nothing_is_left_to_start_warm():
+    with pytest.raises(ValueError, match="none, clarabel cannot start from the frame before"):
+        cells(solvers=["none", "clarabel"], starts=("warm",))

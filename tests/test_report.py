@@ -21,7 +21,8 @@ from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
 from strainbench.report.energy import energies
 from strainbench.report.sweep import sweeps
-from strainbench.report.table import accuracy_text, groups, mark, time_text
+from strainbench.report.table import accuracy_text, as_markdown, groups, mark, time_text
+from strainbench.report.warm import pairs
 
 
 def row(solver, **changes):
@@ -193,3 +194,29 @@ def test_a_style_is_a_solvers_own():
 def test_nothing_to_report_is_one_line(tmp_path):
     with pytest.raises(RecordsError, match="holds no results"):
         write_report(tmp_path)
+
+
+def test_cold_and_warm_starts_stand_side_by_side(tmp_path):
+    warm = {"solver_parameters": '{"warm": true}'}
+    slow = {"solve_seconds_median": 0.03, "iterations_mean": 12, "distance_max": 1e-3}
+    fast = {"solve_seconds_median": 0.02, "iterations_mean": 5, "distance_max": 2e-3}
+    rows = [
+        row("good-warm", **fast, **warm),
+        row("other"),
+        row("good", **slow),
+        row("good", **slow, mode="replay"),
+        row("alone-warm", **fast, **warm),
+        row("misleading-warm", **fast),
+        row("misleading", **slow),
+    ]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
+    runs = load_runs(tmp_path)
+    (pair,) = pairs(runs)
+    expected = ("swing 10, simulate", "1%", "good", "1.50", "12 → 5", "1 → 2")
+    assert pair.line() == expected
+    first = next(group for group in groups(runs) if "simulate" in group.title)
+    names = [solver for _, solver, _ in first.blocks()]
+    assert names[:3] == ["other", "good", "good-warm"]
+    markdown = as_markdown(runs, {})
+    assert f"| {' | '.join(expected)} |" in markdown
+    assert "Cold and warm" not in as_markdown(runs[runs["solver"] == "other"], {})

@@ -55,8 +55,6 @@ def pairs(runs: pd.DataFrame) -> list[Pair]:
 
 def beside_twins(solvers: list[str]) -> list[str]:
     """Names in their order, each warm twin right after its cold one."""
-    first = {name: place for place, name in reversed(list(enumerate(solvers)))}
-    return sorted(
-        solvers,
-        key=lambda n: (first.get(n.removesuffix(SUFFIX), first[n]), n.endswith(SUFFIX)),
-    )
+    place = {name: k for k, name in enumerate(solvers)}
+    twin = {name: name.removesuffix(SUFFIX) for name in solvers}
+    return sorted(solvers, key=lambda n: (place.get(twin[n], place[n]), n.endswith(SUFFIX)))
