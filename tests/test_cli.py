@@ -29,7 +29,7 @@ def strainbench(*words, cwd):
     ("words", "line"),
     [
         (["run", "swim"], "no scenario called 'swim'; valid are"),
-        (["run", "swing", "--solver", "mosek"], "no solver called 'mosek'; valid are clarabel"),
+        (["run", "swing", "--solver", "mosek"], "no solver called 'mosek'; valid are admm"),
         (["run", "swing", "--set", "resolutoin=10"], "no setting 'resolutoin'; valid are"),
         (["run", "swing", "--set", "resolution=ten"], "the value must be int"),
         (["run", "swing", "--set", "limit=1.01"], "a strain between 0 and 1 is valid"),
