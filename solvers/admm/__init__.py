@@ -145,7 +145,7 @@ class Iteration:
             self._solve_for_positions()  # 2
             step = self.problem.G @ self.x - self.z
             if iteration % LOOK == 0:
-                monitor(self.x.copy(), self.multipliers)
+                monitor(self.x, self.multipliers, iteration)
                 if self._converged(tolerance):  # 3
                     return "solved", iteration
                 if deadline.passed:
