@@ -167,7 +167,7 @@ class AugmentedLagrangian(Solver):
                 step()
                 steps += 1
                 if steps & (steps - 1) == 0:
-                    monitor(minimum.x.copy(), minimum.Y.reshape(-1, 3).copy())
+                    monitor(minimum.x.copy(), minimum.Y.reshape(-1, 3).copy(), steps)
             x, Y = minimum.x, minimum.Y  # 4
         return Solution(x, status, steps, Y.reshape(-1, 3), {"updates": updates})
 

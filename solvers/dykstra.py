@@ -157,7 +157,7 @@ class Dykstra(Solver):
             if done >= self.max_sweeps:
                 return Solution(run.x, "iteration limit", done, Y)
             if done >= mark:
-                monitor(run.x.copy(), Y.copy())
+                monitor(run.x.copy(), Y.copy(), done)
                 mark = 2 * done
             sweeps = 2 * max(1, min(chunk, done // CHECK, self.max_sweeps - done) // 2)
             run = self._advance(G, frame, run, sweeps)

@@ -140,7 +140,7 @@ class Xpbd(Solver):
                 sweeps = min(mark - done, chunk, self.max_sweeps - done)
                 done += sweep(G, b, x, l, *settings, sweeps)
             if done == mark:
-                monitor(x.copy())
+                monitor(x.copy(), iterations=done)
                 mark *= 2
         return Solution(x, status, done, 2 * l[:, None] * (problem.G @ x))
 

@@ -1,4 +1,4 @@
-"""The command line: list, run, report, compare, converge, export, render, polar."""
+"""The command line: list, run, report, compare, converge, export, ledger, render, polar."""
 
 from __future__ import annotations
 
@@ -40,8 +40,10 @@ app = typer.Typer(
 )
 console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
+DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
 DEFAULT_CONVERGENCE = Path("results/local/convergence")
+DEFAULT_STEPS = 10
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
@@ -79,7 +81,12 @@ def run(
         list[str] | None,
         typer.Option("--set", help="KEY=V1,V2 of the scenario, or SOLVER.KEY=V1,V2"),
     ] = None,
-    steps: Annotated[int, typer.Option(help="time steps a cell")] = 10,
+    steps: Annotated[
+        int | None, typer.Option(help=f"time steps a cell; {DEFAULT_STEPS} if not given")
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="seconds of the scene's time a cell, instead of --steps")
+    ] = None,
     mode: Annotated[str, typer.Option(help="simulate (closed loop) or replay (same frames)")] = (
         "simulate"
     ),
@@ -108,8 +115,17 @@ def run(
             raise ValueError(f"{name} {value}: a whole number above 0 is valid")
     if memory_limit is not None and not memory_limit > 0:
         raise ValueError(f"--memory-limit {memory_limit}: a number of MB above 0 is valid")
+    if steps is not None and duration is not None:
+        raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
     cells = plan(
-        scenarios, solver or ["all"], set_ or [], mode, steps, _numbers(tolerance), time_limit
+        scenarios,
+        solver or ["all"],
+        set_ or [],
+        mode,
+        DEFAULT_STEPS if steps is None else steps,
+        _numbers(tolerance),
+        time_limit,
+        duration,
     )
     memory = memory_limit or 0.75 * psutil.virtual_memory().total / 1024**2 / jobs
     settings = Settings(results, jobs, threads, memory, rerun)
@@ -309,6 +325,34 @@ def _record(cell: Cell, frame: int) -> Problem:
     with _bar() as bar:
         task = bar.add_task(f"playing {cell.title}", total=max(frame - 1, 1))
         return record(cell, frame, lambda asked: bar.update(task, completed=asked - 1))
+
+
+@app.command()
+def ledger(
+    scenarios: Annotated[
+        list[str] | None, typer.Argument(help="scenario names, or paths; by default all of ours")
+    ] = None,
+    solver: Annotated[str, typer.Option(help="name, or path of a .py file")] = "clarabel",
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="KEY=VALUE of the scenarios")
+    ] = None,
+    steps: Annotated[int, typer.Option(help="time steps")] = 60,
+    tolerance: Annotated[float, typer.Option(help="aimed at by the solver")] = 1e-6,
+    results: Annotated[Path, typer.Option(help="folder of the table")] = DEFAULT_LEDGER,
+) -> None:
+    """Write what each scene models, and what each part of its physics changes in the answer."""
+    from strainbench import ledger as accounts  # pandas only where it is needed
+
+    names = scenarios or [entry.name for entry in list_scenarios()]
+    cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
+    with _bar() as bar:
+        paths = accounts.write_ledger(
+            cells,
+            results,
+            lambda items, what, total: bar.track(items, total, description=what),
+        )
+    for path in paths:
+        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
 
 
 def _bar() -> Progress:

@@ -120,6 +120,14 @@ def from_file(path: str) -> list[Solver]:
     return found
 
 
+def steps_for(scene: PluginRef, duration: float) -> int:
+    """The time steps of a scene that come nearest to `duration` [s], at least one."""
+    step = dict(scene.parameters).get("step")
+    if not isinstance(step, int | float):
+        raise ValueError(f"--duration {duration:g}: no time passes in {scene.name}; give --steps")
+    return max(1, round(duration / step))
+
+
 def plan(
     scenarios: Sequence[str],
     solvers: Sequence[str],
@@ -128,8 +136,9 @@ def plan(
     steps: int,
     tolerances: Sequence[float],
     time_limit: float | None,
+    duration: float | None = None,
 ) -> list[Cell]:
-    """All cells of a run.
+    """All cells of a run; with a `duration` [s] each has its own number of steps, and not `steps`.
 
     Raises
     ------
@@ -140,10 +149,10 @@ def plan(
         raise ValueError(f"--mode {mode}: valid are {', '.join(MODES)}")
     if steps < 1:
         raise ValueError(f"--steps {steps}: a whole number above 0 is valid")
-    times = [] if time_limit is None else [time_limit]
-    for name, values in (("--tolerance", tolerances), ("--time-limit", times)):
+    times = (("--time-limit", [time_limit]), ("--duration", [duration]))
+    for name, values in (("--tolerance", tolerances), *times):
         for value in values:
-            if not 0 < value < float("inf"):
+            if value is not None and not 0 < value < float("inf"):
                 raise ValueError(f"{name} {value}: a number above 0 is valid")
     choices = parse_settings(settings)
     scenes = plan_scenarios(scenarios, choices)
@@ -153,8 +162,9 @@ def plan(
         if owner and owner not in owners:
             valid = ", ".join(sorted(owners))
             raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
+    counts = {s: steps if duration is None else steps_for(s, duration) for s in scenes}
     cells = [
-        Cell(scene, method, mode, steps, tolerance, time_limit)
+        Cell(scene, method, mode, counts[scene], tolerance, time_limit)
         for scene, method, tolerance in product(scenes, methods, tolerances)
     ]
     return list({cell.key: cell for cell in cells}.values())

@@ -98,6 +98,8 @@ STEP_COLUMNS = (
     "pin_work",
     "contact_energy",
     "penetration",
+    "equilibrium_residual",
+    "equilibrium_distance",
 )
 
 Row = dict[str, str]

@@ -31,7 +31,9 @@ class StepReport:
     Energies are in J, with the velocities after the projection; heights count from y = 0. The
     momentum is in kg m/s. `pin_work` [J] is the work of the forces that hold the pins, as the
     minimisations of the step find them; it is 0 for pins that do not move. `penetration` [m] is
-    the depth of the deepest vertex inside an obstacle, after the projection.
+    the depth of the deepest vertex inside an obstacle, after the projection. Of a scene at rest,
+    `equilibrium_residual` is the force that is left, relative to the weight, and
+    `equilibrium_distance` [m] how far the farthest vertex is from a certified equilibrium.
     """
 
     time: float = 0.0  # [s], at the end of the step
@@ -51,6 +53,8 @@ class StepReport:
     pin_work: float = 0.0
     contact_energy: float = 0.0
     penetration: float = 0.0
+    equilibrium_residual: float = float("nan")
+    equilibrium_distance: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -172,9 +176,10 @@ class SheetScenario(Scenario):
 
 @dataclass(frozen=True)
 class ClothScenario(SheetScenario):
-    """A sheet of cloth that moves under gravity, stepped by one of the paper's schemes.
+    """A sheet of cloth, stepped by one of the paper's schemes.
 
-    Bending is built where "bending" is in `needs`.
+    Gravity, membrane and bending are built where they are in `needs`; without "inertia" each step
+    starts at rest.
 
     Parameters
     ----------
@@ -196,8 +201,8 @@ class ClothScenario(SheetScenario):
             raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
 
     def material(self) -> Material:
-        """The constants of Tang et al. 2022, section 5; no bending where it is not needed."""
-        return Material() if "bending" in self.needs else Material(bending=0.0)
+        """The constants of Tang et al. 2022, section 5; without the energies not needed."""
+        return Material().only(self.needs)
 
     def contact(self) -> Contact | None:
         """What the sheet is kept off, or None."""
@@ -243,6 +248,8 @@ class ClothScenario(SheetScenario):
             step = _Step(self, cloth, motion.velocities)
             motion = scheme(motion, self.step, step.minimise, project)
             yield step.report(motion)
+            if "inertia" not in self.needs:
+                motion = Motion(motion.positions, np.zeros_like(positions), motion.time)
 
 
 class _Step:
@@ -251,6 +258,7 @@ class _Step:
     def __init__(self, scene: ClothScenario, cloth: Cloth, velocities: FloatArray) -> None:
         self.scene, self.cloth, self.velocities = scene, cloth, velocities
         self.settings = NewtonSettings()
+        self.gravity = GRAVITY if "gravity" in scene.needs else np.zeros(3)
         self.seconds, self.pin_work = 0.0, 0.0
         self.newton: list[NewtonReport] = []
 
@@ -262,6 +270,7 @@ class _Step:
         pinned, first = self.cloth.pinned, start.copy()
         where = self.scene.pin_positions(time)
         first[pinned] = start[pinned] if where is None else where
+        inertial = inertial + step**2 * (self.gravity - GRAVITY)  # the schemes add it to all
         push = self.scene.force(start, self.velocities, time)
         if push is not None:
             inertial = inertial + step**2 * push / self.cloth.mass[:, None]
@@ -291,7 +300,7 @@ class _Step:
             factorisation_seconds=sum(r.factorisation_seconds for r in self.newton),
             line_search_seconds=sum(r.line_search_seconds for r in self.newton),
             kinetic_energy=0.5 * float(np.sum(mass * v**2)),
-            gravity_energy=-float(np.sum(mass * motion.positions @ GRAVITY[:, None])),
+            gravity_energy=-float(np.sum(mass * motion.positions @ self.gravity[:, None])),
             membrane_energy=membrane,
             bending_energy=bending,
             momentum_x=float(momentum[0]),

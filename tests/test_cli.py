@@ -37,6 +37,7 @@ def strainbench(*words, cwd):
         (["run", "swing", "--set", "integrator=rk4"], "integrator is 'rk4': valid are sap"),
         (["run", "swing", "--mode", "both"], "--mode both: valid are simulate, replay"),
         (["run", "swing", "--steps", "0"], "--steps 0"),
+        (["run", "swing", "--steps", "3", "--duration", "1"], "one of them is valid"),
         (["run", "swing", "--jobs", "0"], "--jobs 0"),
         (["run", "swing", "--tolerance", "tight"], "--tolerance tight"),
         (["run", "swing", "--solver", "./nowhere.py"], "./nowhere.py: no such file"),

@@ -154,8 +154,51 @@ def test_the_pseudo_time_step_follows_the_leading_residual():
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("shape", "round"), ("gather", -0.1), ("folds", 0), ("diagonals", "x")]
+    ("key", "value"),
+    [("shape", "round"), ("gather", -0.1), ("folds", 0), ("start", "rest"), ("diagonals", "x")],
 )
 def test_wrong_values_are_named(key, value):
     with pytest.raises(ValueError, match=f"{key} is {value!r}"):
         replace(Drape(), **{key: value})
+
+
+@pytest.mark.parametrize("shape", SAMPLES)
+def test_a_true_projection_keeps_the_drape_where_it_is(shape):
+    scene = Drape(resolution=5, shape=shape)
+    reports = list(islice(scene.play(projector(scene)), 12))
+    assert max(r.equilibrium_residual for r in reports) < 5e-3
+    assert max(r.equilibrium_distance for r in reports) < 5e-5
+
+
+def test_no_projection_does_not_keep_it():
+    reports = list(islice(Drape(resolution=5).play(lambda target: target), 12))
+    assert reports[-1].equilibrium_distance > 1e-2
+
+
+def test_from_the_folds_the_steps_approach_a_drape():
+    scene = Drape(resolution=5, start="folds")
+    reports = list(islice(scene.play(projector(scene)), 80))
+    assert reports[0].equilibrium_distance > 1e-2
+    assert reports[-1].equilibrium_residual < 1e-1 * reports[0].equilibrium_residual
+
+
+def test_exact_limits_start_from_the_folds():
+    with pytest.raises(ValueError, match="start is 'drape': with exact directions only folds"):
+        Drape(directions="exact")
+    scene = Drape(resolution=3, directions="exact", start="folds")
+    report = next(scene.play(lambda target: target))
+    assert np.isnan(report.equilibrium_distance)
+    assert np.isfinite(report.equilibrium_residual)
+
+
+@pytest.mark.parametrize("shape", SAMPLES)
+@pytest.mark.parametrize("limit", [0.001, 0.1])
+@pytest.mark.parametrize("gather", [0.0, 0.5])
+def test_any_drape_warms_up(shape, limit, gather):
+    Drape(resolution=20, shape=shape, limit=limit, gather=gather, folds=3).warm_up()
+
+
+def test_a_drape_that_is_not_certified_is_not_played():
+    scene = Drape(resolution=3, folds=3)  # flat: too few cells for its folds
+    with pytest.raises(ArithmeticError, match="no certified drape: 1000 iterations, residual"):
+        next(scene.play(lambda target: target))

@@ -49,9 +49,6 @@ UNSCALED = [
 """Out of the box: an objective known to 1e-8 of its size leaves positions uncertain by 1e-4."""
 
 
-LIMITING = [n for n in NAMES if n not in ("none", *FIXED_COUNT)]
-
-
 def exactness(name):
     return 5e-4 if name in UNSCALED else 5e-6
 

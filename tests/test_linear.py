@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from scenarios.swing import Swing
+from strainbench.discovery import find_solver
 from strainbench.physics import linear
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
 from strainbench.physics.linear import (
@@ -17,7 +18,7 @@ from strainbench.physics.linear import (
     best_linear_solver,
     symmetric,
 )
-from strainbench.physics.profile import profile, run, table
+from strainbench.physics.profile import profile, projection, run, table
 
 
 @pytest.fixture(params=PACKAGES, ids=lambda kind: kind.name)
@@ -122,6 +123,17 @@ def test_newton_converges_on_the_swing(h):
     assert table(measured, "swing").row_count == len(measured)
 
 
+def test_limits_change_what_newton_is_given():
+    scene = Swing(resolution=6)
+    free, limited = (
+        profile(scene, 8, *project)
+        for project in ((), (projection(scene, find_solver("clarabel")),))
+    )
+    for name, steps in limited.items():
+        assert all(m.report.converged for m in steps)
+        assert [m.report.residual for m in steps] != [m.report.residual for m in free[name]]
+
+
 @pytest.mark.parametrize(
     ("scene", "step", "line"),
     [
@@ -133,3 +145,8 @@ def test_newton_converges_on_the_swing(h):
 def test_a_wrong_word_to_the_profile_is_one_line(scene, step, line):
     with pytest.raises(SystemExit, match=line):
         run(scene, 2, 1, step)
+
+
+def test_a_solver_that_the_profile_does_not_know_is_one_line():
+    with pytest.raises(SystemExit, match="no solver called 'mosek'; valid are"):
+        run("swing", 2, 1, 0.01, "mosek")

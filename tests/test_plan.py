@@ -135,6 +135,12 @@ def test_the_plan_is_the_cross_product_of_all_that_is_given():
     assert {parameters(c.scenario)["resolution"] for c in found} == {2, 4}
 
 
+def test_a_duration_gives_each_step_size_its_number_of_steps():
+    found = cells(settings=["step=0.01,0.0166666667,0.1,0.8"], duration=0.5)
+    assert [c.steps for c in found] == [50, 30, 5, 1]
+    assert [cells(settings=["step=0.3"], duration=d)[0].steps for d in (0.01, 0.5)] == [1, 2]
+
+
 def test_a_setting_with_an_owner_touches_nobody_else():
     (none, *clarabel) = cells(solvers=["none", "clarabel"], settings=["clarabel.form=paper"])
     assert none.solver.parameters == ()
@@ -207,6 +213,9 @@ def test_a_solver_from_a_file_runs_beside_ours(mine):
         ({"settings": ["diagonals=both"]}, r"swing: diagonals is 'both'.*alternating, uniform"),
         ({"mode": "relive"}, r"--mode relive: .*simulate, replay"),
         ({"steps": 0}, r"--steps 0"),
+        ({"duration": 0.0}, r"--duration 0"),
+        ({"duration": float("inf")}, r"--duration inf"),
+        ({"duration": 1.0, "scenarios": ["drape"]}, r"--duration 1: no time passes in drape"),
         ({"tolerances": [0.0]}, r"--tolerance 0"),
         ({"tolerances": [1e-6, float("nan")]}, r"--tolerance nan"),
         ({"tolerances": [float("inf")]}, r"--tolerance inf"),

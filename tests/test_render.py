@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import meshio
 import numpy as np
@@ -317,3 +318,35 @@ def test_a_wrong_word_is_one_line_and_exit_2(words, line, tmp_path):
     assert line in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
     assert "Traceback" not in done.stdout
+
+
+def test_obstacles_are_grey_surfaces_of_their_shape():
+    from strainbench.physics.contact import Floor, Sphere
+    from strainbench.render.obstacles import patches
+
+    cloth = np.array([[0.0, 1.0, 0.0], [2.0, 1.0, 1.0]])
+    vertices, faces = patches([Sphere((1.0, 2.0, 3.0), 0.5), Floor(-1.0)], cloth)
+    flat = vertices[:, 1] == -1.0
+    np.testing.assert_allclose(np.linalg.norm(vertices[~flat] - [1, 2, 3], axis=1), 0.5)
+    assert vertices[flat, 0].min() < 0 < 2 < vertices[flat, 0].max()
+    assert vertices[flat, 2].min() < 0 < 1 < vertices[flat, 2].max()
+    assert set(faces.ravel()) == set(range(len(vertices)))
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    on_floor = flat[faces].all(axis=1)
+    assert area[~on_floor].sum() == pytest.approx(4 * np.pi * 0.25, rel=0.01)
+    assert area[on_floor].sum() == pytest.approx(2.6 * 1.6)
+
+
+def test_a_ball_hides_what_is_behind_it_and_cloth_in_front_hides_the_ball():
+    from scenarios.collision import SPHERE, Collision
+
+    cell = plan_one("collision", "none", ["resolution=4"], 1, 1e-6)
+    film = shoot(cell)
+    assert film.obstacles == Collision().contact().obstacles == (SPHERE,)
+    bare = replace(film, obstacles=())
+    for elevation, hidden in ((90.0, True), (-90.0, False)):
+        camera = Camera(0.0, elevation)
+        ball, none = (Picture(f, camera).draw(0).astype(int) for f in (film, bare))
+        changed = np.abs(ball - none).max(axis=2) > 40  # not but the seams between triangles
+        assert np.any(changed) != hidden

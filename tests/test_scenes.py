@@ -42,7 +42,8 @@ def test_clarabel_is_optimal_on_every_step(name):
     assert [c.outcome for _, _, c in seen] == ["optimal"] * len(seen)
     assert all(r.newton_converged for r in reports)
     if isinstance(scene, ClothScenario):
-        values = [list(vars(r).values()) for r in reports]
+        still = {"equilibrium_residual", "equilibrium_distance"}  # of scenes at rest alone
+        values = [[v for k, v in vars(r).items() if k not in still] for r in reports]
         assert np.all(np.isfinite(np.array(values, dtype=float)))
 
 

@@ -115,6 +115,8 @@ best iterate is returned |
         status = "iteration limit"
         for k in range(self.max_iterations + 1):
             error = iterate.measure()
+            if k:
+                monitor(iterate.x, iterate.Y)
             if error < best:
                 best, best_at, kept = error, k, (iterate.x, iterate.Y)
             if error <= tolerance:  # 2
@@ -136,7 +138,6 @@ best iterate is returned |
             except NotPositiveDefiniteError:  # K is, but for rounding
                 status = "stalled"
                 break
-            monitor(iterate.x)
         x, Y = (iterate.x, iterate.Y) if kept is None else kept
         return Solution(x, status, k, Y)
 

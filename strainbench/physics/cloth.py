@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +27,11 @@ class Material:
     young: float = 1800.0  # [Pa]
     poisson: float = 0.41
     bending: float = 1e-6  # hinge stiffness [J]; the paper gives none. 0 builds no hinges
+
+    def only(self, parts: Collection[str]) -> Material:
+        """The same without the energies, "membrane" and "bending", that are not among `parts`."""
+        young = self.young if "membrane" in parts else 0.0
+        return replace(self, young=young, bending=self.bending if "bending" in parts else 0.0)
 
     @property
     def lame(self) -> tuple[float, float]:

@@ -2,10 +2,10 @@
 
     python -m strainbench.physics.profile swing --resolution 60 --steps 20
 
-plays a cloth scene without projection. Each step is solved with every linear solver in turn, so
-that they share whatever else the machine does; the first one's positions go on. Printed are
-medians over the steps: seconds a step, its split, and the ratio of the whole step to the assembly
-and factorisation in it. OMP_NUM_THREADS=1 keeps each on one core.
+plays a cloth scene without projection, or with that of `--solver NAME`. Each step is solved with
+every linear solver in turn, so that they share whatever else the machine does; the first one's
+positions go on. Printed are medians over the steps: seconds a step, its split, and the ratio of the
+whole step to the assembly and factorisation in it. OMP_NUM_THREADS=1 keeps each on one core.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from strainbench.discovery import find_scenario
+from strainbench.discovery import find_scenario, find_solver
 from strainbench.limits import FloatArray
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
-from strainbench.physics.integrators import Motion, step_and_project
+from strainbench.physics.integrators import Motion, Project, step_and_project
 from strainbench.physics.linear import LinearSolver, available_linear_solvers
 from strainbench.scenario import ClothScenario
+from strainbench.solver import Solver, run_solver
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,9 @@ class Measured:
         return self.seconds / max(r.assembly_seconds + r.factorisation_seconds, 1e-12)
 
 
-def profile(scenario: ClothScenario, steps: int) -> dict[str, list[Measured]]:
+def profile(
+    scenario: ClothScenario, steps: int, project: Project = lambda target: target
+) -> dict[str, list[Measured]]:
     """Every step of every installed linear solver, by the solver's name."""
     cloth = scenario.cloth()
     solvers = [kind(cloth.pattern.matrix()) for kind in available_linear_solvers()]
@@ -63,8 +66,19 @@ def profile(scenario: ClothScenario, steps: int) -> dict[str, list[Measured]]:
     positions = scenario.sheet()[2]
     motion = Motion(positions, np.zeros_like(positions), 0.0)
     for _ in range(steps):
-        motion = step_and_project(motion, scenario.step, minimise, lambda target: target)
+        motion = step_and_project(motion, scenario.step, minimise, project)
     return measured
+
+
+def projection(scenario: ClothScenario, solver: Solver, tolerance: float = 1e-6) -> Project:
+    """Onto the limits of a scene."""
+    problem = scenario.problem()
+    if refusal := solver.supports(problem):
+        raise ValueError(f"{solver.label} cannot take {scenario.name}: {refusal}")
+    state = solver.prepare(problem)
+    return lambda target: (
+        run_solver(solver, problem.with_target(target), state, tolerance).positions
+    )
 
 
 def _measure(
@@ -112,6 +126,7 @@ def run(
     resolution: Annotated[int, typer.Option(min=1)] = 60,
     steps: Annotated[int, typer.Option(min=1)] = 20,
     step: Annotated[float, typer.Option(help="time step [s]")] = 1 / 60,
+    solver: Annotated[str, typer.Option(help="of the projection; none leaves it out")] = "none",
 ) -> None:
     """Print the split of implicit Euler's time on SCENARIO."""
     try:
@@ -119,11 +134,12 @@ def run(
         if not issubclass(kind, ClothScenario):
             raise ValueError(f"{name} has no cloth that moves by implicit Euler")
         small, scene = (kind(resolution=n, step=step) for n in (2, resolution))
+        project = projection(scene, find_solver(solver))
     except ValueError as error:
         raise SystemExit(f"strainbench.physics.profile: {error}") from None
     profile(small, 1)  # compiles
-    measured = profile(scene, steps)
-    title = f"{name} {resolution}x{resolution}, {steps} steps of {step:.4g} s"
+    measured = profile(scene, steps, project)
+    title = f"{name} {resolution}x{resolution}, {steps} steps of {step:.4g} s, solver {solver}"
     Console(width=150).print(table(measured, title))
 
 

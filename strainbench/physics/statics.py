@@ -17,7 +17,8 @@ norm of the masses M, with h a pseudo time step,
 
 M u' / h^2 is a normal of C at z' in the projection's own norm: the forces G^T Y of the limits. So
 with any h the fixed point has grad E(z) + G^T Y = 0, the conditions of a constrained minimum, and
-their residual at z' is known without a further solve. Minimising E itself in 1 does not converge:
+their residual at z' is known without a further solve; started with z and u of such a point, it
+stays there. Minimising E itself in 1 does not converge:
 cloth under compression is not convex, and the clamped model is. Neither is there a proof for a
 non-convex E, nor one minimum: what is found depends on the start.
 """
@@ -67,10 +68,12 @@ class Equilibrium:
     gravity: float
 
 
-def potential(cloth: Cloth, x: FloatArray) -> tuple[float, float, float, FloatArray]:
+def potential(
+    cloth: Cloth, x: FloatArray, gravity: FloatArray = GRAVITY
+) -> tuple[float, float, float, FloatArray]:
     """Membrane, bending and gravity energy [J], and the gradient (n, 3) of their sum [N]."""
     membrane, bending, gradient = cloth.energies(x)
-    weight = cloth.mass[:, None] * GRAVITY
+    weight = cloth.mass[:, None] * gravity
     return membrane, bending, -float(np.sum(weight * x)), gradient - weight
 
 
@@ -79,6 +82,8 @@ def constrained_minimum(
     start: FloatArray,
     project: Callable[[FloatArray], FloatArray],
     settings: StaticsSettings,
+    gravity: FloatArray = GRAVITY,
+    limit_forces: FloatArray | None = None,
 ) -> Iterator[Equilibrium]:
     """Approach a minimum of the potential under limits, step by step.
 
@@ -86,11 +91,14 @@ def constrained_minimum(
     ----------
     start : (n, 3) within the limits [m]; its pinned vertices stay where they are
     project : onto the limits, in the norm of the cloth's masses
+    gravity : (3,) [m/s^2]
+    limit_forces : (n, 3) at the start [N], or None for none
     """
     free, M, h, r = cloth.pattern.free, cloth.mass[:, None], settings.step, settings.relaxation
     weight = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[free]))
-    z, u = start.copy(), np.zeros_like(start)
-    gradient, linear = potential(cloth, z)[-1], cloth.linear_solver
+    z = start.copy()
+    u = np.zeros_like(start) if limit_forces is None else h**2 * limit_forces / M
+    gradient, linear = potential(cloth, z, gravity)[-1], cloth.linear_solver
     count = 0
     while True:
         linear.factorise(cloth.hessian_values(z, cloth.mass / h**2))
@@ -100,9 +108,9 @@ def constrained_minimum(
         z = project(relaxed + u)  # 2
         u = relaxed + u - z  # 3
         forces = M * u / h**2
-        membrane, bending, gravity, gradient = potential(cloth, z)
+        membrane, bending, height, gradient = potential(cloth, z, gravity)
         residual = float(np.linalg.norm((gradient + forces)[free])) / weight
-        yield Equilibrium(z, forces, residual, membrane, bending, gravity)
+        yield Equilibrium(z, forces, residual, membrane, bending, height)
         count += 1
         if count % settings.balance_every == 0:  # 4
             apart = float(np.sum(M * (x - z) ** 2) ** 0.5)

@@ -11,7 +11,9 @@ import numpy as np
 
 from strainbench.cell import Cell
 from strainbench.limits import FloatArray
+from strainbench.physics.contact import Obstacle
 from strainbench.problem import Problem
+from strainbench.scenario import ClothScenario
 from strainbench.solver import Solver, run_solver
 
 Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
@@ -41,6 +43,7 @@ class Film:
     scene, solver : what the titles say
     interval : time between frames [s], or None
     stopped : why the last frames are missing, or ""
+    obstacles : what the cloth is kept off
     """
 
     scene: str
@@ -49,6 +52,7 @@ class Film:
     frames: list[Frame]
     interval: float | None
     stopped: str = ""
+    obstacles: tuple[Obstacle, ...] = ()
 
     @cached_property
     def strains(self) -> list[FloatArray]:
@@ -95,7 +99,9 @@ def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
     parameters: dict[str, Any] = dict(cell.scenario.parameters)
     scene = f"{scenario.name}, {parameters['resolution']}×{parameters['resolution']} cells"
     interval = None if step is None else every * step
-    return Film(scene, solver.label, problem, frames, interval, stopped)
+    contact = scenario.contact() if isinstance(scenario, ClothScenario) else None
+    obstacles = contact.obstacles if contact else ()
+    return Film(scene, solver.label, problem, frames, interval, stopped, obstacles)
 
 
 class _Cut(Exception):  # noqa: N818

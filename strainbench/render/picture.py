@@ -24,9 +24,11 @@ from strainbench.limits import FloatArray
 from strainbench.problem import IntArray
 from strainbench.render.export import surface
 from strainbench.render.film import Film
+from strainbench.render.obstacles import patches
 
 SIZE, DPI = (7.2, 5.2), 150  # [in]: 1080 x 780 pixels, both even as video needs
 MAP = "viridis_r"  # light where the cloth is slack, so that its folds are seen
+OBSTACLE_GREY = 0.88
 LIMIT_COLOUR = "#D55E00"  # Okabe and Ito's vermilion
 ROUND = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 ROUNDER = (1.0, 2.0, 5.0, 10.0)
@@ -104,6 +106,9 @@ class Picture:
         self.film, self.camera = film, camera or Camera()
         self.problem = film.problem
         self.faces, self.owner = surface(self.problem)
+        everywhere = np.concatenate([f.positions for f in film.frames])
+        self.obstacles, patched = patches(film.obstacles, everywhere)
+        self.all_faces = np.concatenate([self.faces, patched + self.problem.vertices])
         self.norm = Normalize(0.0, 100 * (colour_top(film) if top is None else top))
         self.figure = Figure(figsize=SIZE, dpi=DPI, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
@@ -116,7 +121,8 @@ class Picture:
         ax = self.ax = self.figure.add_axes((0.03, 0.04, 0.75, 0.81))
         ax.set_axis_off()
         ax.set_aspect("equal")
-        seen = np.concatenate([self.camera.view(f.positions)[:, :2] for f in self.film.frames])
+        shown = [f.positions for f in self.film.frames] + [self.obstacles]
+        seen = np.concatenate([self.camera.view(x)[:, :2] for x in shown])
         low, high = seen.min(axis=0), seen.max(axis=0)
         margin = 0.05 * float((high - low).max())
         width, height = np.array(ax.get_position(original=True).size) * SIZE
@@ -195,13 +201,18 @@ class Picture:
     def draw(self, index: int) -> NDArray[np.uint8]:
         """(height, width, 3) pixels of the frame of that index."""
         frame, strains = self.film.frames[index], self.film.strains[index]
-        seen = self.camera.view(frame.positions)
-        order = np.argsort(seen[self.faces, 2].sum(axis=1), kind="stable")  # far ones first
-        colours = colormaps[MAP](self.norm(100 * strains[self.owner]))[:, :3]
-        colours = (colours * shades(seen, self.faces)[:, None])[order]
-        self.cloth.set_verts(list(seen[self.faces[order], :2]))
+        seen = self.camera.view(np.concatenate([frame.positions, self.obstacles]))
+        faces = self.all_faces
+        depth = seen[faces, 2].mean(axis=1)
+        depth[len(self.faces) :] -= self.problem.edge_length  # flat triangles on a ball sink in
+        order = np.argsort(depth, kind="stable")  # far ones first
+        colours = np.full((len(faces), 3), OBSTACLE_GREY)
+        colours[: len(self.faces)] = colormaps[MAP](self.norm(100 * strains[self.owner]))[:, :3]
+        colours = (colours * shades(seen, faces)[:, None])[order]
+        edges = np.where(order < len(self.faces), 0.8, 1.0)[:, None]  # none seen on obstacles
+        self.cloth.set_verts(list(seen[faces[order], :2]))
         self.cloth.set_facecolor(colours)
-        self.cloth.set_edgecolor(0.8 * colours)
+        self.cloth.set_edgecolor(edges * colours)
         self.pins.set_data(*seen[self.problem.pinned, :2].T)
         clock = f"step {frame.step}" if frame.time is None else f"t = {frame.time:.3f} s"
         self.line.set_text(

@@ -8,7 +8,7 @@ import pandas as pd
 
 from strainbench.records import RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
-from strainbench.report.energy import draw_energy
+from strainbench.report.energy import draw_energy, energy_markdown
 from strainbench.report.page import write_page
 from strainbench.report.sweep import draw_sweeps, sweep_markdown
 from strainbench.report.table import as_latex, as_markdown, describe, tidy
@@ -61,6 +61,9 @@ def write_report(folder: Path) -> list[Path]:
     if swept := sweep_markdown(runs):
         paths["sweeps.md"] = folder / "sweeps.md"
         paths["sweeps.md"].write_text("# Sweeps\n\n" + "\n\n".join(swept) + "\n")
+    if table := energy_markdown(folder, runs):
+        paths["energy.md"] = folder / "energy.md"
+        paths["energy.md"].write_text(table)
     paths["table1.tex"].write_text(as_latex(runs))
     charts = speed_accuracy(runs, folder / "speed-accuracy") + draw_energy(folder, runs)
     charts += draw_sweeps(folder, runs)

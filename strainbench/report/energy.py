@@ -20,6 +20,13 @@ PARTS = [
     "contact_energy",
 ]
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
+TABLE = """# Total energy
+
+After each step. Energy above that of the first steps is a sign of instability; a run that comes to
+rest has a small range in its last quarter.
+
+| scene | run | steps | time [s] | first [mJ] | highest | last | range in the last quarter |
+| --- | --- | --- | --- | --- | --- | --- | --- |"""
 LOW = 2.0  # the axis shows energies down to this many times the lowest of the runs that lose energy
 
 
@@ -53,6 +60,19 @@ def _names(row: pd.Series) -> tuple[str, str]:
     solver = "" if alone else f", {row['solver']}"
     panel = f"{row['scenario']}, {row['resolution']:.0f} cells, {100 * row['limit']:g}% limit"
     return panel, f"{scheme}{solver}, dt = {1000 * settings.get('step', 0):.3g} ms"
+
+
+def energy_markdown(folder: Path, runs: pd.DataFrame) -> str:
+    """A table of each run's energies, or nothing without energies."""
+    lines = []
+    for _, run in energies(folder, runs).groupby("cell", sort=False):
+        energy = 1000 * run["energy"].to_numpy()
+        late = energy[-max(2, len(energy) // 4) :]
+        values = (energy[0], energy.max(), energy[-1], late.max() - late.min())
+        first, end = run.iloc[0], run["time"].max()
+        numbers = " | ".join(f"{v:.4g}" for v in (end, *values))
+        lines.append(f"| {first['panel']} | {first['curve']} | {len(run)} | {numbers} |")
+    return "\n".join([TABLE, *lines]) + "\n" if lines else ""
 
 
 def draw_energy(folder: Path, runs: pd.DataFrame) -> list[Path]:

@@ -98,7 +98,7 @@ def accuracy_text(row: pd.Series | None) -> str:
     if row is None or pd.isna(row["max_violation"]):
         return ""
     if pd.isna(row["relative_gap_max"]):
-        return f"{_power(row['max_violation'])} · local"
+        return f"{power(row['max_violation'])} · local"
     return " · ".join(
         (
             power(row["max_violation"]),

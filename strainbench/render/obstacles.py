@@ -1,0 +1,60 @@
+"""Obstacles as grey surfaces among the faces of the cloth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from strainbench.limits import FloatArray
+from strainbench.physics.contact import Floor, Obstacle, Sphere
+from strainbench.problem import IntArray
+
+TURNS = 48  # meridians of a sphere: facets that the eye does not see at our size
+TILES = 12  # of a floor, along each side
+BEYOND = 0.15  # of the cloth's extent, by which a floor goes further than it
+
+
+def patches(obstacles: Sequence[Obstacle], cloth: FloatArray) -> tuple[FloatArray, IntArray]:
+    """Vertices (v, 3) [m] and triangles (t, 3) of the obstacles that have a known shape.
+
+    Parameters
+    ----------
+    cloth : (n, 3) positions over all frames [m]: a floor reaches a little beyond them
+    """
+    vertices, faces = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
+    for obstacle in obstacles:
+        if isinstance(obstacle, Sphere):
+            points = _ball(obstacle)
+        elif isinstance(obstacle, Floor):
+            points = _tiles(obstacle, cloth)
+        else:
+            continue
+        faces = np.concatenate([faces, _triangles(points) + len(vertices)])
+        vertices = np.concatenate([vertices, points.reshape(-1, 3)])
+    return vertices, faces
+
+
+def _ball(sphere: Sphere) -> FloatArray:
+    """(r, c, 3) points along meridians and parallels."""
+    theta = np.linspace(0, np.pi, TURNS // 2 + 1)[:, None]
+    phi = np.linspace(0, 2 * np.pi, TURNS + 1)
+    height = np.broadcast_to(np.cos(theta), (len(theta), len(phi)))
+    unit = np.stack([np.sin(theta) * np.sin(phi), height, np.sin(theta) * np.cos(phi)], axis=-1)
+    return np.array(sphere.centre) + sphere.radius * unit
+
+
+def _tiles(floor: Floor, cloth: FloatArray) -> FloatArray:
+    """(r, c, 3) points of a rectangle below the cloth."""
+    low, high = cloth[:, [0, 2]].min(axis=0), cloth[:, [0, 2]].max(axis=0)
+    beyond = BEYOND * (high - low).max()
+    x, z = np.linspace(low - beyond, high + beyond, TILES + 1).T
+    grid = np.meshgrid(z, x)
+    return np.stack([grid[1], np.full_like(grid[0], floor.height), grid[0]], axis=-1)
+
+
+def _triangles(points: FloatArray) -> IntArray:
+    """(t, 3) two for each quadrangle of a grid of points (r, c, 3)."""
+    number = np.arange(points[..., 0].size).reshape(points.shape[:2])
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    return np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
