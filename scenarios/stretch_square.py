@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from strainbench.limits import FloatArray
 from strainbench.mesh import square_grid
-from strainbench.problem import IntArray
+from strainbench.problem import IntArray, Problem
 from strainbench.scenario import SheetScenario, StepReport
 
 SIDE = 0.5  # [m]
@@ -25,6 +25,8 @@ class StretchSquare(SheetScenario):
     Parameters
     ----------
     scale_x, scale_y : the candidate's sides over the square's.
+    compression : largest compression allowed in the sampled directions; 0.1, or 10%, is a least
+        stretch of 0.9. 1, the default, is none; below it the projection is not convex.
     """
 
     name = "stretch-square"
@@ -32,12 +34,28 @@ class StretchSquare(SheetScenario):
 
     scale_x: float = 2.0
     scale_y: float = 0.5
+    compression: float = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         for key in ("scale_x", "scale_y"):
             if not 0 < getattr(self, key) < float("inf"):
                 raise ValueError(f"{key} is {getattr(self, key)}: a number above 0 is valid")
+
+        if not 0 <= self.compression <= 1:
+            raise ValueError(
+                f"compression is {self.compression}: a strain between 0 and 1 is valid, 0.1 or 10%"
+            )
+        if self.compression < 1 and self.directions == "exact":
+            raise ValueError("compression: exact limits have none; sampled directions do")
+
+    def problem(self) -> Problem:
+        """See the base class; with the least stretch where compression is limited."""
+        problem = super().problem()
+        if self.compression == 1:
+            return problem
+        lower = np.full(len(problem.limits.directions), 1 - self.compression)
+        return replace(problem, limits=replace(problem.limits, lower=lower))
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class; the positions are the candidate."""

@@ -11,7 +11,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.conic import ConicForm
 from strainbench.limits import FloatArray
+
+CONES = {
+    "second-order": clarabel.SecondOrderConeT,
+    "semidefinite": clarabel.PSDTriangleConeT,
+}
 
 
 @dataclass(frozen=True)
@@ -22,20 +28,23 @@ class Clarabel(Solver):
 
     form="quadratic": minimise s/2 u'Mu subject to (b_i, (G target)_i + (G u)_i) in Q^4, the
         quadratic objective given as such. Equal to Eq. 12 but for the cone of the objective.
+        Exact limits have a semidefinite cone an element: see `strainbench.conic`.
     form="paper": Eq. 12 literally, with t_0, t_i, y_i and rotated cones. Clarabel has no
         rotated cone: (u, v, y) in Q_r iff (u + v, u - v, sqrt(2) y) in Q.
 
     Parameters
     ----------
     form : "quadratic" or "paper"
-    scaling : factor s of the objective in units of 1/edge^2; None leaves it in m^2. Tuned on
-        frames of the swing at 10 to 40 cells: from 1 to 256, the gap reached falls from 3e-6 to
-        7e-8 and the violation rises from 4e-9 to 2e-7; 16 is in between. At 64 (`tight`, the
-        referee's reference) the multipliers are good on every frame, for 15% more time.
+    scaling : factor s of the objective in units of 1/edge^2 over the mean mass, with lengths in
+        edges; None leaves both as they are. Tuned on frames of the swing at 10 to 40 cells: from
+        1 to 256, the gap reached falls from 3e-6 to 7e-8 and the violation rises from 4e-9 to
+        2e-7; 16 is in between. At 64 (`tight`, the referee's reference) the multipliers are good
+        on every frame, for 15% more time.
     equilibrate : Clarabel's own scaling; with the objective scaled it does harm.
     """
 
     name = "clarabel"
+    takes_exact = True
     variants = {
         "default": {"scaling": None, "equilibrate": True},
         "tight": {"scaling": 64.0},
@@ -50,6 +59,12 @@ class Clarabel(Solver):
         if self.form not in ("quadratic", "paper"):
             raise ValueError(f"form is {self.form!r}: valid are quadratic, paper")
 
+    def supports(self, problem: Problem) -> str | None:
+        """Eq. 12 has no form for exact limits."""
+        if problem.limits.spectral and self.form == "paper":
+            return "Eq. 12 has no form for exact limits, only for sampled directions"
+        return super().supports(problem)
+
     def prepare(self, problem: Problem) -> QuadraticForm | PaperForm:
         """The matrices and Clarabel's symbolic factorisation."""
         if self.form == "paper":
@@ -61,7 +76,8 @@ class Clarabel(Solver):
         settings.verbose = False
         settings.max_threads = 1
         settings.equilibrate_enable = self.equilibrate
-        settings.presolve_enable = False  # it forbids new right-hand sides
+        settings.presolve_enable = False  # these two forbid new right-hand sides
+        settings.chordal_decomposition_enable = False
         return settings
 
     def solve(
@@ -88,8 +104,7 @@ class Clarabel(Solver):
         state.solver.update(q=q, b=rhs, settings=settings)
         result = state.solver.solve()
         status = str(result.status)
-        positions = problem.target.copy()
-        positions[problem.free] = state.free_positions(problem, np.array(result.x))
+        positions = state.positions(problem, np.array(result.x))
         if "Infeasible" in status:
             positions[:] = np.nan
         return Solution(
@@ -101,35 +116,31 @@ class Clarabel(Solver):
 
 
 class QuadraticForm:
-    """Displacements as unknowns, the objective as a quadratic, one 4-cone a constraint."""
+    """Displacements as unknowns, the objective as a quadratic, one cone a constraint."""
 
     def __init__(self, problem: Problem, settings: Any, scaling: float | None) -> None:
-        n, m = len(problem.free), problem.rows
-        self.scale = 1.0 if scaling is None else scaling / problem.edge_length**2
-        weights = self.scale * np.repeat(problem.weights[problem.free], 3)
-        blocks = sp.kron(problem.G[:, problem.free], sp.eye_array(4, 3, k=-1))
-        self.unknowns = 3 * n
+        self.form = ConicForm(problem, scaling)
+        q, rhs = self.vectors(problem)
         self.solver = clarabel.DefaultSolver(
-            sp.csc_matrix(sp.diags_array(weights)),
-            np.zeros(self.unknowns),
-            -sp.csc_matrix(blocks),
-            self.vectors(problem)[1],
-            [clarabel.SecondOrderConeT(4)] * m,
+            sp.csc_matrix(self.form.P),
+            q,
+            sp.csc_matrix(self.form.A),
+            rhs,
+            [CONES[self.form.cone](self.form.order)] * self.form.count,
             settings,
         )
 
     def vectors(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
-        """No linear objective; rows (b_i, (G target)_i)."""
-        rhs = np.column_stack([problem.bounds, problem.G @ problem.target])
-        return np.zeros(self.unknowns), rhs.ravel()
+        """No linear objective, and the cones' constants."""
+        return np.zeros(len(problem.free) * 3), self.form.constants(problem)
 
-    def free_positions(self, problem: Problem, z: FloatArray) -> FloatArray:
+    def positions(self, problem: Problem, z: FloatArray) -> FloatArray:
         """Target plus displacement."""
-        return problem.target[problem.free] + z.reshape(-1, 3)
+        return self.form.positions(problem, z)
 
     def multipliers(self, duals: FloatArray) -> FloatArray:
-        """The vector part of each cone's dual, in the problem's own units."""
-        return -duals.reshape(-1, 4)[:, 1:] / self.scale
+        """See `ConicForm`."""
+        return self.form.multipliers(duals)
 
 
 class PaperForm:
@@ -183,9 +194,11 @@ class PaperForm:
         limits = np.tile([0.5, 0.5, 0.0, 0.0, 0.0], self.m)
         return q, np.concatenate([problem.bounds**2, -fixed.ravel(), objective, limits])
 
-    def free_positions(self, problem: Problem, z: FloatArray) -> FloatArray:
-        """The first unknowns."""
-        return z[: self.n].reshape(-1, 3)
+    def positions(self, problem: Problem, z: FloatArray) -> FloatArray:
+        """The first unknowns, and the pins."""
+        positions = problem.target.copy()
+        positions[problem.free] = z[: self.n].reshape(-1, 3)
+        return positions
 
     def multipliers(self, duals: FloatArray) -> FloatArray:
         """The duals of y_i = A_i x."""

@@ -1,10 +1,11 @@
 """Nonlinear programming with Ipopt (Tang et al. 2022, Table 1; Wachter and Biegler 2006).
 
-    minimise s/2 ||x - target||_M^2  such that  ||y_i||^2 <= b_i^2,  y = G x,
+    minimise s/2 ||x - target||_M^2  such that  l_i^2 <= ||y_i||^2 <= b_i^2,  y = G x,
 
 over the free vertices alone, with exact sparse derivatives: row i of the Jacobian is
-2 y_i^T (x) g_i, and the Hessian of the Lagrangian, s M + 2 sum_i l_i g_i g_i^T, is the same for
-the three coordinates and linear in the multipliers l.
+2 y_i^T (x) g_i, and the Hessian of the Lagrangian, s M + 2 sum_i m_i g_i g_i^T, is the same for
+the three coordinates and linear in the multipliers m. With lower bounds l the problem is not
+convex, and the answer a local minimum near the target.
 """
 
 from __future__ import annotations
@@ -64,6 +65,7 @@ class Ipopt(Solver):
     """
 
     name = "ipopt"
+    takes_lower = True
     variants = {"default": {"scaling": "default"}}
 
     scaling: str = "scaled"
@@ -75,9 +77,14 @@ class Ipopt(Solver):
         if self.hessian not in ("exact", "limited-memory"):
             raise ValueError(f"hessian is {self.hessian!r}: valid are exact, limited-memory")
 
+    def rows(self, problem: Problem) -> Rows:
+        """What is bounded: the limited directions."""
+        g = problem.row_coefficients
+        return Rows(problem.row_vertices, g, problem.lower_bounds, problem.bounds)
+
     def prepare(self, problem: Problem) -> Structure:
         """The sparsity of the derivatives."""
-        return Structure(problem)
+        return Structure(problem, self.rows(problem))
 
     def solve(
         self,
@@ -96,10 +103,10 @@ class Ipopt(Solver):
             return Solution(problem.target.copy(), "solved", 0)
         ipopt = cyipopt.Problem(
             n=start.size,
-            m=problem.rows,
+            m=len(state.rows.bounds),
             problem_obj=nlp,
-            cl=np.full(problem.rows, -np.inf),
-            cu=problem.bounds**2,
+            cl=np.where(state.rows.lower > 0, state.rows.lower**2, -np.inf),
+            cu=state.rows.bounds**2,
         )
         for option, value in self._options(tolerance, deadline).items():
             ipopt.add_option(option, value)
@@ -135,28 +142,46 @@ class Ipopt(Solver):
         return options
 
 
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Bounds on lengths: lower <= ||y_i|| <= bounds with y_i = sum_k g_k x_k.
+
+    vertices : (rows, k); coefficients : (rows, k), g [1/m]; lower, bounds : (rows,).
+    """
+
+    vertices: IntArray
+    coefficients: FloatArray
+    lower: FloatArray
+    bounds: FloatArray
+
+
 class Structure:
     """The sparsity of the derivatives, unknowns being (free vertices, 3) in C order.
 
     Attributes
     ----------
-    G : (rows, free vertices) sparse [1/m]
+    rows : what is bounded
+    G, fixed : (rows, free vertices) and (rows, pins) sparse [1/m]
     row, value : (non-zeros of G,) row index and entry [1/m] of each non-zero
     jacobian, hessian : (row indices, column indices), the Hessian's of the lower triangle
     products : (pairs, rows) sparse: 2 g_iv g_iw [1/m^2] for each pair of neighbours v >= w
     diagonal : (free vertices,) index of the pair (v, v)
     """
 
-    def __init__(self, problem: Problem) -> None:
-        n = len(problem.free)
-        self.G = sp.csr_array(problem.G[:, problem.free])
+    def __init__(self, problem: Problem, rows: Rows) -> None:
+        n, count = len(problem.free), len(rows.bounds)
+        self.rows = rows
+        places = np.repeat(np.arange(count), rows.vertices.shape[1]), rows.vertices.ravel()
+        shape = (count, problem.vertices)
+        G = sp.csr_array(sp.coo_array((rows.coefficients.ravel(), places), shape=shape))
+        self.G, self.fixed = sp.csr_array(G[:, problem.free]), G[:, problem.pinned]
         entries = self.G.tocoo()
         self.row, self.value = entries.row, entries.data
         self.jacobian = np.repeat(self.row, 3), _coordinates(entries.col)
 
         unknown = np.full(problem.vertices, -1)
         unknown[problem.free] = np.arange(n)
-        column, g = unknown[problem.row_vertices], problem.row_coefficients
+        column, g = unknown[rows.vertices], rows.coefficients
         a, b = np.tril_indices(column.shape[1])
         v, w = np.maximum(column[:, a], column[:, b]), np.minimum(column[:, a], column[:, b])
         i, pair = np.nonzero(w >= 0)
@@ -164,7 +189,7 @@ class Structure:
         found, index = np.unique(keys, return_inverse=True)
         self.products = sp.csr_array(
             (2 * (g[:, a] * g[:, b])[i, pair], (index[: len(i)], i)),
-            shape=(len(found), problem.rows),
+            shape=(len(found), count),
         )
         self.diagonal = index[len(i) :]
         self.hessian = _coordinates(found // max(n, 1)), _coordinates(found % max(n, 1))
@@ -191,7 +216,7 @@ class Callbacks:
         self.monitor, self.deadline = monitor, deadline
         self.weights = scale * unit**2 * problem.weights[problem.free, None]
         self.target = problem.target[problem.free] / unit
-        self.fixed = problem.G[:, problem.pinned] @ problem.target[problem.pinned]
+        self.fixed = structure.fixed @ problem.target[problem.pinned]
         self.iterations = 0
         self.iterate = self.target.ravel()
 
@@ -243,5 +268,5 @@ class Callbacks:
     def intermediate(self, algorithm: int, iteration: int, *progress: float) -> bool:
         """Whether to go on; called once an iteration."""
         self.iterations = iteration
-        self.monitor(self.positions(self.iterate))
+        self.monitor(self.positions(self.iterate), iterations=iteration)
         return not self.deadline.passed

@@ -14,6 +14,7 @@ class NoProjection(Solver):
 
     name = "none"
     takes_exact = True
+    takes_lower = True
 
     def solve(
         self,

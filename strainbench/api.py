@@ -25,7 +25,8 @@ def solve(
     ----------
     tolerance : the max violation and relative gap to aim for; what is reached, `certify` tells.
     time_limit : [s], passed on to the solver as its deadline; None is no limit.
-    watch : called off the clock with (seconds, positions, multipliers) of each iterate shown.
+    watch : called off the clock with (seconds, iterations, positions, multipliers) of each iterate
+        shown; it copies what it keeps.
 
     Raises
     ------

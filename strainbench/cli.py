@@ -1,4 +1,4 @@
-"""The command line: list, run, report, render, polar, ledger."""
+"""The command line: list, run, report, compare, converge, export, ledger, render, polar."""
 
 from __future__ import annotations
 
@@ -21,10 +21,15 @@ from rich.progress import (
 )
 from rich.table import Table
 
+from strainbench import __version__
 from strainbench.cell import Cell
 from strainbench.discovery import Entry, list_scenarios, list_solvers
-from strainbench.plan import plan
+from strainbench.export import check_format, write_problem
+from strainbench.frame import record, recorder
+from strainbench.plan import plan, plan_one, plan_scene
+from strainbench.problem import Problem
 from strainbench.records import RecordsError
+from strainbench.reference import REFERENCE_SOLVER
 from strainbench.runner import Observer, Runner, Settings, Summary
 
 app = typer.Typer(
@@ -37,6 +42,7 @@ console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
 DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
+DEFAULT_CONVERGENCE = Path("results/local/convergence")
 DEFAULT_STEPS = 10
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -154,6 +160,28 @@ def report(
 
 
 @app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(help="folder of results, A")],
+    second: Annotated[Path, typer.Argument(help="folder of results, B")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="a .csv or .md file to write too")
+    ] = None,
+) -> None:
+    """Compare two folders of results, cell by cell: ratios of times, changes in outcome."""
+    from strainbench.report import compare as comparing  # pandas only where needed
+
+    found = comparing.compare(first, second)
+    if output is not None:
+        comparing.write_comparison(found, output)
+    for line in found.head():
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    for table in found.tables():
+        console.print(table)
+    for line in [*found.foot(), *([f"wrote {output}"] if output else [])]:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+@app.command()
 def render(
     scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
     solver: Annotated[str, typer.Option(help="name, or path of a .py file")] = "clarabel",
@@ -227,6 +255,76 @@ def polar(
         )
     for line in lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+
+@app.command()
+def export(
+    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    frame: Annotated[int, typer.Option(help="which projection, the first being 1")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="the file to write")],
+    format_: Annotated[
+        str, typer.Option("--format", help="cbf or npz; by default what the file's name ends in")
+    ] = "",
+    solver: Annotated[
+        str, typer.Option(help="answers the projections before; name, or path of a .py file")
+    ] = REFERENCE_SOLVER,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="aimed at by the solver")] = 1e-6,
+) -> None:
+    """Write one projection of a scene as a conic instance (CBF) or as arrays (npz)."""
+    kind = check_format(format_ or output.suffix.removeprefix("."))
+    cell = plan_one(scenario, solver, set_ or [], max(frame, 1), tolerance)
+    problem = _record(cell, frame)
+    before = f"those before by {cell.solver.label}"
+    about = f"{cell.scenario.label}, projection {frame}, {before}; strainbench {__version__}"
+    write_problem(problem, output, kind, about)
+    console.print(
+        f"wrote {output}: {3 * len(problem.free)} variables, {problem.constraints} constraints",
+        highlight=False,
+        markup=False,
+        soft_wrap=True,
+    )
+
+
+@app.command("converge")
+def converge_(
+    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    frame: Annotated[int, typer.Option(help="which projection, the first being 1")],
+    solver: Annotated[
+        list[str] | None,
+        typer.Option(help="name, comma-separated names, path of a .py file, or all (default)"),
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
+    ] = None,
+    tolerance: Annotated[float, typer.Option(help="the tightest that solvers aim at")] = 1e-8,
+    time_limit: Annotated[float, typer.Option(help="seconds a solver, all its runs")] = 60.0,
+    results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_CONVERGENCE,
+) -> None:
+    """Follow solvers on one projection of a scene: violation, gap and distance against time."""
+    from strainbench.converge import converge  # pebble and the referee only where needed
+    from strainbench.report.convergence import write_convergence
+
+    cells = plan_scene(scenario, solver or ["all"], set_ or [], 1, tolerance, time_limit)
+    problem = _record(recorder(cells[0]), frame)
+    memory = 0.75 * psutil.virtual_memory().total / 1024**2
+    with _bar() as bar:
+        ended = converge(cells, problem, frame, results, memory)
+        for cell, ending in bar.track(ended, len(cells), description="solvers"):
+            bar.console.print(f"{cell.solver.label}: {ending}", highlight=False, markup=False)
+    for path in write_convergence(results):
+        console.print(f"wrote {path}", highlight=False)
+
+
+def _record(cell: Cell, frame: int) -> Problem:
+    """A projection of a scene, with a progress bar on the way there."""
+    with _bar() as bar:
+        task = bar.add_task(f"playing {cell.title}", total=max(frame - 1, 1))
+        return record(cell, frame, lambda asked: bar.update(task, completed=asked - 1))
 
 
 @app.command()

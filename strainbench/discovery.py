@@ -23,7 +23,7 @@ Plugin = TypeVar("Plugin", Solver, Scenario)
 
 
 class UnavailableError(ValueError):
-    """A plug-in of ours that needs a package which is not installed."""
+    """A plug-in of ours that needs what is not installed."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,8 @@ def list_solvers() -> list[Entry]:
             entries.append(Entry(stem.replace("_", "-"), *_summary("solvers", stem), str(error)))
             continue
         for solver in (v for c in classes for v in _variants(c)):
-            entries.append(Entry(solver.label, *method_and_paper(solver.__doc__)))
+            method, paper = method_and_paper(solver.__doc__)
+            entries.append(Entry(solver.label, method, paper, solver.missing()))
     return entries
 
 
@@ -121,6 +122,8 @@ def _ours(name: str) -> Solver | None:
             raise UnavailableError(f"solver {name} is unavailable: {error}") from error
         for solver in (v for c in _classes(module, Solver) for v in _variants(c)):
             if solver.label == name:
+                if missing := solver.missing():
+                    raise UnavailableError(f"solver {name} is unavailable: {missing}")
                 return solver
     return None
 

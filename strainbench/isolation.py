@@ -12,7 +12,7 @@ import psutil
 from pebble import ProcessExpired, ProcessPool
 
 from strainbench.cell import Cell
-from strainbench.play import EVENTS, GO, play, read_events
+from strainbench.play import EVENTS, GO, Task, play, read_events
 
 START_LIMIT = 180.0  # [s] for imports and compilation, before a cell's clock starts
 GRACE = 2.0  # [s] after the time limit in which a solver may stop by itself
@@ -48,10 +48,11 @@ class Running:
         folder: Path,
         recording: Path | None,
         memory_limit_mb: float,
+        task: Task = play,
     ) -> Running:
-        """Start `play` in the next process of `pool`."""
+        """Start `task` in the next process of `pool`."""
         folder.mkdir(parents=True)
-        future = pool.schedule(play, args=(cell, folder, recording))
+        future = pool.schedule(task, args=(cell, folder, recording))
         return cls(cell, folder, future, memory_limit_mb)
 
     def has_ended(self) -> bool:

@@ -64,7 +64,8 @@ def _step_rows(
     steps = {e["step"]: e for e in events if e["event"] == "step"}
     rows: list[dict[str, object]] = []
     for number, (event, found) in enumerate(zip(projections, certificates, strict=True), start=1):
-        verdict = {k: v for k, v in vars(found).items() if k != "reason"}
+        verdict = {k: v for k, v in vars(found).items() if k not in ("reason", *LOCAL)}
+        details = event["details"] | {k: v for k, v in vars(found).items() if k in LOCAL and v == v}
         physics = steps.get(event["step"], {})
         rows.append(
             {
@@ -76,13 +77,15 @@ def _step_rows(
                 "iterations": event["iterations"],
                 **verdict,
                 **{k: physics.get(k, "") for k in PHYSICS},
-                "details": json.dumps(event["details"]) if event["details"] else "",
+                "details": json.dumps(details) if details else "",
             }
         )
     return rows
 
 
 PHYSICS = tuple(f.name for f in fields(StepReport))
+LOCAL = ("kkt_residual", "best_known")
+"""What certificates have where lower bounds leave them no gap; kept among a step's details."""
 
 
 def _run_row(
@@ -129,6 +132,14 @@ def _run_row(
         "play_seconds": sum(seconds) + sum(e["ie_seconds"] for e in steps),
     }
     return row
+
+
+def _badness(certificate: Certificate) -> float:
+    """What the reason of an outcome is about."""
+    c = certificate
+    if c.outcome == "violated":
+        return c.max_violation
+    return c.kkt_residual if np.isnan(c.relative_gap) else c.relative_gap
 
 
 def _cut_off(cell: Cell, events: list[dict[str, Any]], ending: str) -> list[float]:
@@ -200,8 +211,7 @@ def _outcome(
         outcome = max((c.outcome for c in certificates), key=OUTCOMES.index)
         worst = [c for c in certificates if c.outcome == outcome]
         if outcome != "optimal":
-            measure = "max_violation" if outcome == "violated" else "relative_gap"
-            found = max(worst, key=lambda c: float(getattr(c, measure))).reason
+            found = max(worst, key=_badness).reason
             reasons.append(f"{len(worst)} of {len(certificates)} projections: {found} at worst")
     unconverged = sum(e["event"] == "step" and not e["newton_converged"] for e in events)
     if unconverged:

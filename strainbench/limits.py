@@ -54,44 +54,63 @@ class StretchLimits:
     spectral : bool
         Whether the limit is exact, see `exact`: one constraint an element, ||F D||_2 <= 1 with
         D = diag(1 / bounds). The directions are then the material axes.
+    lower : (m,) or (e, m), optional
+        Least stretch allowed in each direction, above 0 and at most the bound: a limit on
+        compression. Such limits are not convex, and only some methods take them.
 
     Raises
     ------
     ValueError
         Naming the field, the index and the value: a bound that is not positive and finite,
-        a direction that is not a unit vector, one that is given twice with different bounds,
-        or shapes that do not match.
+        a lower one above it, a direction that is not a unit vector, one that is given twice
+        with different bounds, or shapes that do not match.
     """
 
     directions: FloatArray
     bounds: FloatArray
     spectral: bool = False
+    lower: FloatArray | None = None
 
     def __post_init__(self) -> None:
         directions = frozen_array("limits.directions", self.directions, 2)
         bounds = frozen_array("limits.bounds", self.bounds, 1, 2)
         if len(directions) == 0:
             raise ValueError("limits.directions: at least one direction is needed")
-        if bounds.shape[-1] != len(directions):
-            raise ValueError(
-                f"limits.bounds: shape {bounds.shape} does not match {len(directions)} directions; "
-                f"valid are ({len(directions)},) and (elements, {len(directions)})"
-            )
-        for index in np.argwhere(bounds <= 0)[:1]:
-            raise ValueError(
-                f"limits.bounds{index.tolist()} is {bounds[tuple(index)]}: a bound must be above 0"
-            )
+        _check_bounds("limits.bounds", bounds, len(directions))
         for row in np.flatnonzero(np.abs(np.linalg.norm(directions, axis=1) - 1) > 1e-6)[:1]:
             raise ValueError(f"limits.directions[{row}] is {directions[row]}: not a unit vector")
         if self.spectral and not np.array_equal(directions, np.eye(len(directions))):
             raise ValueError("limits.directions: exact limits have the material axes, in order")
-        keep = _distinct(directions, bounds)
-        for name, array in (("directions", directions[keep]), ("bounds", bounds[..., keep])):
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        kept = {"directions": directions, "bounds": bounds}
+        if self.lower is not None:
+            kept["lower"] = self._checked_lower(bounds)
+        keep = _distinct(directions, *[kept[name] for name in kept if name != "directions"])
+        for name, array in kept.items():
+            distinct = array[keep] if name == "directions" else array[..., keep]
+            distinct.setflags(write=False)
+            object.__setattr__(self, name, distinct)
+
+    def _checked_lower(self, bounds: FloatArray) -> FloatArray:
+        assert self.lower is not None
+        if self.spectral:
+            raise ValueError("limits.lower: exact limits have upper bounds alone")
+        lower = frozen_array("limits.lower", self.lower, 1, 2)
+        _check_bounds("limits.lower", lower, bounds.shape[-1])
+        if lower.ndim == bounds.ndim == 2 and len(lower) != len(bounds):
+            raise ValueError(
+                f"limits.lower: {len(lower)} rows, but limits.bounds has {len(bounds)}"
+            )
+        for index in np.argwhere(lower > bounds)[:1]:
+            least, largest = (a[tuple(index)] for a in np.broadcast_arrays(lower, bounds))
+            raise ValueError(
+                f"limits.lower{index.tolist()} is {least}: at most the bound {largest} is valid"
+            )
+        return lower
 
     @classmethod
-    def isotropic(cls, bound: float, directions: int = 4) -> StretchLimits:
+    def isotropic(
+        cls, bound: float, directions: int = 4, lower: float | None = None
+    ) -> StretchLimits:
         """The same bound in `directions` equally spaced angles in [-pi/2, pi/2) (section 3.1).
 
         Between the samples the true stretch can reach bound / cos(pi / (2 directions)).
@@ -99,13 +118,15 @@ class StretchLimits:
         if not isinstance(directions, (int, np.integer)) or directions < 1:
             raise ValueError(f"directions is {directions!r}: a whole number of at least 1 is valid")
         angles = -np.pi / 2 + np.pi * np.arange(directions) / directions
-        return cls.sampled(angles, np.full(directions, bound))
+        return cls.sampled(angles, np.full(directions, bound), lower)
 
     @classmethod
-    def orthotropic(cls, warp: float, weft: float, shear: float) -> StretchLimits:
+    def orthotropic(
+        cls, warp: float, weft: float, shear: float, lower: float | None = None
+    ) -> StretchLimits:
         """Bounds along warp (0 degrees), weft (90 degrees) and both diagonals (+-45 degrees)."""
         angles = np.pi / 4 * np.array([-2, -1, 0, 1])
-        return cls.sampled(angles, [weft, shear, warp, shear])
+        return cls.sampled(angles, [weft, shear, warp, shear], lower)
 
     @classmethod
     def exact(cls, bound: ArrayLike, weft: ArrayLike | None = None, dim: int = 2) -> StretchLimits:
@@ -132,11 +153,19 @@ class StretchLimits:
         return cls(np.eye(dim), np.stack(axes, axis=-1), spectral=True)
 
     @classmethod
-    def sampled(cls, angles: ArrayLike, bounds: ArrayLike) -> StretchLimits:
-        """Any curve, by its samples: `angles` (m,) [rad], `bounds` (m,) or (e, m)."""
+    def sampled(
+        cls, angles: ArrayLike, bounds: ArrayLike, lower: ArrayLike | None = None
+    ) -> StretchLimits:
+        """Any curve, by its samples: `angles` (m,) [rad], `bounds` (m,) or (e, m).
+
+        `lower` may be one number, the least stretch in every direction.
+        """
         alpha = frozen_array("limits.angles", angles, 1)
         directions = np.column_stack([np.cos(alpha), np.sin(alpha)])
-        return cls(directions, frozen_array("limits.bounds", bounds, 1, 2))
+        if lower is not None:
+            least = frozen_array("limits.lower", lower, 0, 1, 2)
+            lower = np.full(len(alpha), least) if least.ndim == 0 else least
+        return cls(directions, frozen_array("limits.bounds", bounds, 1, 2), lower=lower)
 
     @classmethod
     def from_csv(cls, path: str | Path) -> StretchLimits:
@@ -161,7 +190,20 @@ class StretchLimits:
         return cls.sampled(np.deg2rad(angles), bounds)
 
 
-def _distinct(directions: FloatArray, bounds: FloatArray) -> list[int]:
+def _check_bounds(name: str, bounds: FloatArray, directions: int) -> None:
+    """ValueError where bounds do not match the directions or are not above 0."""
+    if bounds.shape[-1] != directions:
+        raise ValueError(
+            f"{name}: shape {bounds.shape} does not match {directions} directions; "
+            f"valid are ({directions},) and (elements, {directions})"
+        )
+    for index in np.argwhere(bounds <= 0)[:1]:
+        raise ValueError(
+            f"{name}{index.tolist()} is {bounds[tuple(index)]}: a bound must be above 0"
+        )
+
+
+def _distinct(directions: FloatArray, *bounds: FloatArray) -> list[int]:
     """Indices of the distinct directions: a curve given from -90 to 90 degrees has one twice."""
     keep: list[int] = []
     for j, direction in enumerate(directions):
@@ -172,7 +214,7 @@ def _distinct(directions: FloatArray, bounds: FloatArray) -> list[int]:
         twins = [k for k, distance in zip(keep, apart, strict=True) if distance < SAME_DIRECTION]
         if not twins:
             keep.append(j)
-        elif not np.array_equal(bounds[..., twins[0]], bounds[..., j]):
+        elif not all(np.array_equal(b[..., twins[0]], b[..., j]) for b in bounds):
             raise ValueError(
                 f"limits.directions[{j}] repeats direction {twins[0]} with another bound"
             )

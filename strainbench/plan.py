@@ -168,3 +168,50 @@ def plan(
         for scene, method, tolerance in product(scenes, methods, tolerances)
     ]
     return list({cell.key: cell for cell in cells}.values())
+
+
+def plan_scene(
+    scenario: str,
+    solvers: Sequence[str],
+    settings: Sequence[str],
+    steps: int,
+    tolerance: float,
+    time_limit: float | None = None,
+) -> list[Cell]:
+    """One scene with one set of values, and its solvers, from the words of a command line.
+
+    Raises
+    ------
+    ValueError
+        One line: a wrong word, or several scenes.
+    """
+    cells = plan([scenario], solvers, settings, "simulate", steps, [tolerance], time_limit)
+    scenes = {str(cell.scenario.identity) for cell in cells}
+    if len(scenes) > 1:
+        raise ValueError(
+            f"--set and {scenario} give {len(scenes)} scenes: one at a time, "
+            "so one value a setting is valid"
+        )
+    return cells
+
+
+def plan_available(
+    scenario: str, solvers: str, settings: Sequence[str], steps: int, tolerance: float
+) -> list[Cell]:
+    """The same; ValueError for an unavailable solver, with the reason."""
+    cells = plan_scene(scenario, [solvers], settings, steps, tolerance)
+    for cell in cells:
+        if cell.solver.unavailable:
+            raise ValueError(cell.solver.unavailable)
+    return cells
+
+
+def plan_one(
+    scenario: str, solver: str, settings: Sequence[str], steps: int, tolerance: float
+) -> Cell:
+    """The same with a single solver; ValueError names those that the words give."""
+    cells = plan_available(scenario, solver, settings, steps, tolerance)
+    if len(cells) > 1:
+        labels = ", ".join(cell.solver.label for cell in cells)
+        raise ValueError(f"--solver and --set give {len(cells)} solvers ({labels}): one is valid")
+    return cells[0]

@@ -68,14 +68,23 @@ def read_frames(folder: Path, count: int) -> Iterator[tuple[FloatArray, FloatArr
             yield np.load(file), np.load(file)
 
 
+Task = Callable[[Cell, Path, Path | None], None]
+"""What a process of its own does: with a cell, the folder to write to, what it is fed or None."""
+
+
 def play(cell: Cell, folder: Path, recording: Path | None) -> None:
     """Run `cell`, writing to `folder`; `recording` holds the frames to replay."""
+    with_journal(folder, lambda journal: _play(cell, folder, journal, recording))
+
+
+def with_journal(folder: Path, work: Callable[[Journal], None]) -> None:
+    """Do a process's work, whose every failure becomes an event of its journal."""
     journal = Journal(folder)
     journal.write("process", pid=os.getpid())
     with (folder / "output.txt").open("w") as output:
         _redirect(output)
         try:
-            _play(cell, folder, journal, recording)
+            work(journal)
         except Stop as stop:
             journal.write("failed", reason=str(stop))
         except Exception as error:  # the one place where a solver's own error becomes a row
@@ -108,10 +117,7 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
     warm_up(solver, problem, cell.tolerance)
     if recording is None:
         scenario.warm_up()
-    journal.write("ready")
-    while not (folder / GO).exists():  # until nothing else that is ours keeps the machine busy
-        time.sleep(0.002)
-    journal.write("started")
+    wait_for_go(folder, journal)
     begin = time.perf_counter()
     state = solver.prepare(problem)
     journal.write("setup", seconds=time.perf_counter() - begin)
@@ -123,6 +129,14 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
             return
         table.step = step + 1
         table.check_time()
+
+
+def wait_for_go(folder: Path, journal: Journal) -> None:
+    """Wait until nothing else that is ours keeps the machine busy."""
+    journal.write("ready")
+    while not (folder / GO).exists():
+        time.sleep(0.002)
+    journal.write("started")
 
 
 def replay(recording: Path, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:

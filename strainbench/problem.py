@@ -159,10 +159,12 @@ class Problem:
                 f"limits.directions: {self.limits.directions.shape[1]} coordinates, "
                 f"but the material space of rest has {dim}"
             )
-        if self.limits.bounds.ndim == 2 and len(self.limits.bounds) != len(self.elements):
-            raise ValueError(
-                f"limits.bounds: {len(self.limits.bounds)} rows for {len(self.elements)} elements"
-            )
+        for name in ("bounds", "lower"):
+            array = getattr(self.limits, name)
+            if array is not None and array.ndim == 2 and len(array) != len(self.elements):
+                raise ValueError(
+                    f"limits.{name}: {len(array)} rows for {len(self.elements)} elements"
+                )
         put("_shape", shape_gradients(self.rest, self.elements))
 
     def _checked_target(self, target: ArrayLike) -> FloatArray:
@@ -199,16 +201,17 @@ class Problem:
         return other
 
     def tightened(self, margin: float) -> Problem:
-        """The same projection with every bound lowered by `margin`."""
+        """The same projection with every bound lowered by `margin`, every lower one raised."""
         other = copy.copy(self)
         limits = self.limits
         if limits.spectral:  # D stays as it is
             bounds = limits.bounds * (1 - margin / limits.bounds.min(axis=-1, keepdims=True))
         else:
             bounds = limits.bounds - margin
-        object.__setattr__(other, "limits", replace(limits, bounds=bounds))
-        other.__dict__.pop("bounds", None)
-        other.__dict__.pop("_reach", None)
+        lower = None if limits.lower is None else limits.lower + margin
+        object.__setattr__(other, "limits", replace(limits, bounds=bounds, lower=lower))
+        for name in ("bounds", "lower_bounds", "_reach"):
+            other.__dict__.pop(name, None)
         return other
 
     @property
@@ -225,6 +228,11 @@ class Problem:
     def constraints(self) -> int:
         """Number of constraints: one a row of G, or one an element where limits are exact."""
         return len(self.elements) if self.limits.spectral else self.rows
+
+    @property
+    def convex(self) -> bool:
+        """Whether there are no lower bounds: then the optimum is unique, and certified."""
+        return self.limits.lower is None
 
     @property
     def gradients(self) -> FloatArray:
@@ -300,6 +308,14 @@ class Problem:
         shape = (len(self.elements), bounds.shape[-1])
         return _read_only(np.broadcast_to(bounds, shape).reshape(-1).copy())
 
+    @cached_property
+    def lower_bounds(self) -> FloatArray:
+        """(constraints,) least stretch; 0 without lower bounds."""
+        lower = np.zeros(1) if self.limits.lower is None else self.limits.lower
+        per_element = self.constraints // len(self.elements)
+        shape = (len(self.elements), per_element)
+        return _read_only(np.broadcast_to(lower, shape).reshape(-1).copy())
+
     def stretches(self, positions: FloatArray) -> FloatArray:
         """(constraints,) stretch at `positions` (n, 3): ||(G x)_i||, or ||F D||_2 min(bounds)."""
         return self._norms(self.G @ positions, 2)
@@ -318,8 +334,10 @@ class Problem:
         return norms
 
     def violations(self, positions: FloatArray) -> FloatArray:
-        """(constraints,) max(0, stretch - b_i)."""
-        return np.maximum(0.0, self.stretches(positions) - self.bounds)
+        """(constraints,) max(0, stretch - b_i), or what it lacks to its lower bound."""
+        stretches = self.stretches(positions)
+        beyond = np.maximum(0.0, stretches - self.bounds)
+        return beyond if self.convex else np.maximum(beyond, self.lower_bounds - stretches)
 
     def deformation_gradients(self, positions: FloatArray) -> FloatArray:
         """(e, 3, dim) F_e at `positions` (n, 3)."""

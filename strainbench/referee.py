@@ -13,6 +13,10 @@ its minimum D(Y) at x_Y = target - M^-1 G^T Y on the free vertices. So, in the n
 
 Y and x_ref come from a reference solver (`strainbench.reference`); nothing that it claims is
 used: Y may be anything, and x_ref is feasible or is not used.
+
+Lower bounds on stretch make the problem nonconvex: there is no such D, and no answer is called
+optimal. What remains is whether x meets the limits, whether it is a local optimum
+(`strainbench.kkt`), and how its objective compares with the best that is known.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from strainbench.kkt import kkt_residual
 from strainbench.limits import FloatArray
 from strainbench.problem import Problem
 from strainbench.reference import Reference, objective_floor, reference_of
@@ -37,8 +42,9 @@ class Certificate:
     outcome : "optimal" (violation and gap both met), "feasible" (the violation alone),
         "violated", or "no answer" (nothing usable came back).
     reason : in words, where the outcome is not "optimal".
-    max_violation : largest max(0, ||F d|| - b) over the limited directions; with exact limits
-        largest max(0, ||F D||_2 - 1) times the tightest axis's bound.
+    max_violation : largest max(0, ||F d|| - b) over the limited directions, or b - ||F d|| of a
+        lower bound; with exact limits largest max(0, ||F D||_2 - 1) times the tightest axis's
+        bound.
     max_principal_stretch : largest singular value of any F, the true stretch.
     objective : f(x) = 1/2 ||x - target||_M^2.
     lower_bound : D(Y) <= f(x*), or 0 where the reference failed.
@@ -48,6 +54,9 @@ class Certificate:
     distance_bound : rigorous upper bound on ||x - x*||, the 2-norm over all vertices.
     reference_error : rigorous upper bound on ||x_ref - x*|| in the same norm.
     active_constraints : constraints within 1e-6 of their bound at the reference solution.
+    kkt_residual, best_known : only with lower bounds, which leave no lower bound on the objective,
+        gap or distance (NaN): the residual of the conditions of a *local* optimum (see
+        `strainbench.kkt`), and the least objective known of any positions within the limits.
     """
 
     outcome: str
@@ -61,6 +70,8 @@ class Certificate:
     distance_bound: float
     reference_error: float
     active_constraints: int
+    kkt_residual: float = float("nan")
+    best_known: float = float("nan")
 
 
 def certify(
@@ -69,6 +80,7 @@ def certify(
     violation: float = 1e-6,
     gap: float = 1e-4,
     reference: Reference | None = None,
+    best_known: float = float("inf"),
 ) -> Certificate:
     """Judge an answer to `problem`.
 
@@ -76,8 +88,10 @@ def certify(
     ----------
     positions : (n, 3) [m]; pinned vertices count as lying at their targets, so moving a pin
         shows as stretch of the elements around it.
-    violation, gap : thresholds of the outcome.
+    violation, gap : thresholds of the outcome; with lower bounds, `gap` is that of the residual
+        below which an answer is called a local optimum.
     reference : of this very problem, where it is known already.
+    best_known : with lower bounds, the least objective known of other answers within the limits.
 
     Raises
     ------
@@ -93,6 +107,8 @@ def certify(
     x = np.array(positions, dtype=np.float64)
     x[problem.pinned] = problem.target[problem.pinned]
     ref = reference_of(problem) if reference is None else reference
+    if not problem.convex:
+        return _certify_local(problem, x, violation, gap, ref, best_known)
     with np.errstate(over="ignore"):  # a diverged answer may be infinitely wrong
         v: FloatArray = problem.violations(x)
         objective = problem.objective(x)
@@ -117,6 +133,50 @@ def certify(
         distance_bound=min(bound, float(radius)) if worst == 0 else bound,
         reference_error=ref.error,
         active_constraints=ref.active_constraints,
+    )
+
+
+def _certify_local(
+    problem: Problem,
+    x: FloatArray,
+    violation: float,
+    gap: float,
+    ref: Reference,
+    best_known: float,
+) -> Certificate:
+    """Judge positions under lower bounds: at best a local optimum."""
+    with np.errstate(over="ignore"):
+        worst = float(problem.violations(x).max())
+        objective = problem.objective(x)
+    residual = kkt_residual(problem, x) if np.isfinite(worst + objective) else float("inf")
+    for y in (x, ref.positions):
+        if problem.violations(y).max() <= violation:
+            best_known = min(best_known, problem.objective(y))
+    outcome, nan = "feasible", float("nan")
+    excess = (objective - best_known) / max(best_known, objective_floor(problem))
+    if worst > violation:
+        outcome = "violated"
+        reason = ref.infeasible or f"violation {worst:.2e} above {violation:.0e}"
+    elif residual > gap:
+        reason = f"no local optimum: KKT residual {residual:.2e} above {gap:.0e}"
+    else:
+        reason = f"at best a local optimum: KKT residual {residual:.2e}"
+    if outcome == "feasible":
+        reason += f", objective {excess:.2e} above the best known"
+    return Certificate(
+        outcome=outcome,
+        reason=reason,
+        max_violation=worst,
+        max_principal_stretch=_largest_singular_value(problem, x),
+        objective=objective,
+        lower_bound=nan,
+        relative_gap=nan,
+        distance=nan,
+        distance_bound=nan,
+        reference_error=nan,
+        active_constraints=ref.active_constraints,
+        kkt_residual=residual,
+        best_known=best_known,
     )
 
 

@@ -3,6 +3,9 @@
 The solver's positions are moved by the last bit of violation that it leaves, or if that fails
 solved for again with tighter bounds, until they are feasible; bound and error are then computed
 from positions and multipliers alone.
+
+A problem with lower bounds is not convex. Its reference is a local optimum found from the target,
+an objective to compare with and nothing more.
 """
 
 from __future__ import annotations
@@ -16,12 +19,13 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from strainbench.discovery import find_solver
+from strainbench.discovery import UnavailableError, find_solver
 from strainbench.limits import FloatArray
 from strainbench.problem import Problem
 from strainbench.solver import Solver, run_solver
 
 REFERENCE_SOLVER = "clarabel-tight"
+LOCAL_SOLVER = "ipopt"  # of problems with lower bounds
 TOLERANCE = 1e-6  # asked of the reference solver, which stalls below
 ATTEMPTS = 4  # each but the first with bounds tightened further, by this and twice the violation
 MARGIN = 1e-8
@@ -39,7 +43,7 @@ class Reference:
     ----------
     positions : (n, 3) [m], feasible, or NaN where none was found
     multiplier_norms : (constraints,) |Y_i|
-    lower_bound : on the objective of any feasible point
+    lower_bound : on the objective of any feasible point; NaN where the problem is not convex
     error : rigorous bound on ||positions - x*||, and on ||x_Y - x*|| [m]; infinite without one
     active_constraints : constraints within ACTIVE of their bound
     infeasible : why no positions can meet the limits, where that is certain
@@ -58,12 +62,24 @@ def objective_floor(problem: Problem) -> float:
     return 0.5 * float(np.sum(problem.weights[problem.free])) * (1e-3 * problem.edge_length) ** 2
 
 
+def local(problem: Problem, positions: FloatArray) -> Reference:
+    """Of a problem that is not convex: nothing is known of other points."""
+    stretches = problem.stretches(positions)
+    active = stretches > problem.bounds - ACTIVE
+    active |= stretches < problem.lower_bounds + ACTIVE
+    nothing = np.full(problem.constraints, np.nan)
+    pins, nan = problem.infeasible_pins(), float("nan")
+    return Reference(positions, nothing, nan, nan, int(np.sum(active)), pins)
+
+
 def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> Reference:
     """Bounds that hold whatever the positions (n, 3) and multipliers (rows, 3) are.
 
     Y is scaled by the factor that makes D largest: D = lin^2 / 2 q with
     lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its own rounding.
     """
+    if not problem.convex:
+        return local(problem, positions)
     Y = np.where(np.isfinite(multipliers), multipliers, 0.0)
     norms = problem.dual_norms(Y)
     products = np.sum((Y * (problem.G @ problem.target)).reshape(len(norms), -1), axis=1)
@@ -97,7 +113,7 @@ class ReferenceSolver:
     """
 
     def __init__(self, problem: Problem, cache: Path | None = None) -> None:
-        self._solver: Solver = find_solver(REFERENCE_SOLVER)
+        self._solver = _reference_solver(problem)
         self._state: Any = None
         self._prepared = False
         self._problem = problem
@@ -120,9 +136,15 @@ class ReferenceSolver:
         return verify(problem, positions, multipliers)
 
     def _solve(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
+        if self._solver is None:
+            nothing = np.full_like(problem.target, np.nan)
+            return nothing, np.zeros((problem.rows, 3))
         if not self._prepared:
             self._state = self._solver.prepare(self._problem)
             self._prepared = True
+        if not problem.convex:
+            found = run_solver(self._solver, problem, self._state, TOLERANCE)
+            return found.positions, np.zeros((problem.rows, 3))
         margin, best = 0.0, -np.inf
         for _ in range(ATTEMPTS):
             tight = problem.tightened(margin)
@@ -137,6 +159,16 @@ class ReferenceSolver:
                 break
             margin += MARGIN + 2 * violation
         return positions, multipliers
+
+
+def _reference_solver(problem: Problem) -> Solver | None:
+    """The solver of references; None where only a missing one could take lower bounds."""
+    if problem.convex:
+        return find_solver(REFERENCE_SOLVER)
+    try:
+        return find_solver(LOCAL_SOLVER)
+    except UnavailableError:
+        return None
 
 
 def repaired(problem: Problem, positions: FloatArray) -> FloatArray:
@@ -187,6 +219,7 @@ def content_key(problem: Problem) -> str:
         problem.row_vertices,
         problem.row_coefficients,
         problem.bounds,
+        problem.lower_bounds,
         problem.target,
         problem.pinned,
         problem.weights,

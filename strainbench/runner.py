@@ -13,7 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from multiprocessing import get_context
 from pathlib import Path
@@ -21,8 +21,8 @@ from typing import Any
 
 from pebble import ProcessPool
 
-from strainbench.cell import Cell, PluginRef
-from strainbench.discovery import find_solver
+from strainbench.cell import Cell
+from strainbench.frame import recorder
 from strainbench.isolation import Running
 from strainbench.judge import identity, judge
 from strainbench.machine import describe_machine, fixed_threads
@@ -214,11 +214,8 @@ class Runner:
 
     def _missing_recordings(self, cells: Sequence[Cell]) -> list[Cell]:
         """The cells that record what replay cells will be fed, where that is not there yet."""
-        reference = PluginRef.of(find_solver(REFERENCE_SOLVER))
         missing = {
-            cell.recording_key: replace(
-                cell, solver=reference, mode="simulate", tolerance=1e-6, time_limit=None
-            )
+            cell.recording_key: recorder(cell)
             for cell in cells
             if cell.mode == "replay" and not self._recording(cell).exists()
         }

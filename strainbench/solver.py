@@ -15,8 +15,9 @@ from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import square_grid
 from strainbench.problem import Problem
 
-Watch = Callable[[float, FloatArray, FloatArray | None], None]
-"""Called with the seconds spent, the positions (n, 3) and perhaps the multipliers (rows, 3)."""
+Watch = Callable[[float, int, FloatArray, FloatArray | None], None]
+"""Called with seconds and iterations so far, the positions (n, 3) and perhaps the multipliers
+(rows, 3); the arrays are the solver's own, and change after the call."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +50,7 @@ class Clock:
     def __init__(self, time_limit: float | None = None, watch: Watch | None = None) -> None:
         self._limit = float("inf") if time_limit is None else time_limit
         self._watch = watch
+        self._iterations = 0
         self._paused = 0.0
         self._start = perf_counter()
 
@@ -67,12 +69,24 @@ class Clock:
         """Whether the deadline has passed: a solver then returns what it has."""
         return self.remaining <= 0
 
-    def monitor(self, positions: FloatArray, multipliers: FloatArray | None = None) -> None:
-        """Show an iterate to whoever watches, off the clock."""
+    def monitor(
+        self,
+        positions: FloatArray,
+        multipliers: FloatArray | None = None,
+        iterations: int | None = None,
+    ) -> None:
+        """Show an iterate to whoever watches, off the clock.
+
+        Parameters
+        ----------
+        iterations : done so far, where the solver does not show the iterate of each.
+        """
         if self._watch is None:
             return
         start = perf_counter()
-        self._watch(start - self._start - self._paused, positions, multipliers)
+        self._iterations = self._iterations + 1 if iterations is None else iterations
+        seconds = start - self._start - self._paused
+        self._watch(seconds, self._iterations, positions, multipliers)
         self._paused += perf_counter() - start
 
 
@@ -83,17 +97,25 @@ class Solver(ABC):
     The first line of the docstring reads "method (paper)"; `strainbench list` shows both.
     `name` is lower case with hyphens. `variants` names other settings worth showing beside the
     defaults: {"default": {"scaling": "default"}} adds the solver `<name>-default`.
-    `takes_exact` says that the method has a form for exact limits.
+    `takes_exact` says that the method has a form for exact limits, `takes_lower` that it has one
+    for lower bounds, which are not convex.
     """
 
     name: ClassVar[str]
     variants: ClassVar[Mapping[str, Mapping[str, object]]] = {}
     takes_exact: ClassVar[bool] = False
+    takes_lower: ClassVar[bool] = False
 
     def supports(self, problem: Problem) -> str | None:
         """None, or the reason why this method cannot take the problem."""
         if problem.limits.spectral and not self.takes_exact:
             return "it has no form for exact limits, only for sampled directions"
+        if not (problem.convex or self.takes_lower):
+            return "it has no form for lower bounds, which are not convex"
+        return None
+
+    def missing(self) -> str | None:
+        """None, or what these parameters need that is not installed."""
         return None
 
     def prepare(self, problem: Problem) -> Any:  # noqa: ARG002
@@ -112,8 +134,9 @@ class Solver(ABC):
     ) -> Solution:
         """Project, aiming for a max violation and a relative gap below `tolerance`.
 
-        `monitor(positions)` shows an iterate, off the clock; `deadline.passed` says when to
-        stop and `deadline.remaining` how many seconds are left. The problem is read-only.
+        `monitor(positions)` shows an iterate, off the clock, with `iterations=k` if not each is
+        shown; `deadline.passed` says when to stop and `deadline.remaining` how many seconds are
+        left. The problem is read-only.
         """
 
     @property
@@ -167,12 +190,14 @@ def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
     if problem.rest.shape[-1] != 2:
         return
     rest, elements = square_grid(2, 1.0, "uniform")
-    bounds = np.atleast_2d(problem.limits.bounds)[0]
+    limits = problem.limits
+    bounds = np.atleast_2d(limits.bounds)[0]
+    lower = None if limits.lower is None else np.atleast_2d(limits.lower)[0]
     toy = Problem(
         rest=rest,
         elements=elements,
         target=np.column_stack([2 * bounds.max() * rest, 0.1 * rest[:, 0]]),
-        limits=StretchLimits(problem.limits.directions, bounds, problem.limits.spectral),
+        limits=StretchLimits(limits.directions, bounds, limits.spectral, lower),
         pinned=np.array([0]) if len(problem.pinned) else np.array([], dtype=np.int64),
         mass=None if problem.mass is None else np.linspace(1.0, 2.0, len(rest)),
     )

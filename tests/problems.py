@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from strainbench import Problem, StretchLimits
+from strainbench.reference import verify
 
 
 def rotation(rng, dim=3):
@@ -150,6 +151,24 @@ def scattered_triangles(rng, count=6, mass=False):
         excess = max(0.0, length - problem.bounds[e])
         exact[triangle] -= np.outer(step, y / length) * excess / (g @ step)
     return problem, exact
+
+
+def stretched_cube(limits):
+    """Five tetrahedra, a corner pinned, beyond limits of some per cent."""
+    rest = np.array([[i & 1, i >> 1 & 1, i >> 2] for i in range(8)], dtype=float)
+    corners = [[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]]
+    noise = 0.1 * np.random.default_rng(3).normal(size=(8, 3))
+    target = rest * [1.6, 1.2, 0.5] + noise
+    return Problem(rest, np.array(corners), target, limits, pinned=np.array([0]))
+
+
+def own_gap(problem, solution):
+    """The referee's relative gap, from the solver's own multipliers instead of a reference's."""
+    nowhere = np.full_like(problem.target, np.nan)
+    bound = verify(problem, nowhere, solution.multipliers).lower_bound
+    norms = problem.dual_norms(solution.multipliers)
+    priced = float(norms @ problem.violations(solution.positions))
+    return (problem.objective(solution.positions) + priced) / bound - 1
 
 
 def central_difference(function, x, h=1e-6):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import subprocess
 import sys
@@ -9,7 +10,7 @@ import time
 
 import pytest
 
-from strainbench.records import RUNS
+from strainbench.records import RUNS, STEP_COLUMNS, STEPS, read_rows
 
 RUN = ["run", "swing", "--solver", "none", "--set", "resolution=2", "--steps", "1"]
 
@@ -29,7 +30,7 @@ def strainbench(*words, cwd):
     ("words", "line"),
     [
         (["run", "swim"], "no scenario called 'swim'; valid are"),
-        (["run", "swing", "--solver", "mosek"], "no solver called 'mosek'; valid are clarabel"),
+        (["run", "swing", "--solver", "mosek"], "no solver called 'mosek'; valid are"),
         (["run", "swing", "--set", "resolutoin=10"], "no setting 'resolutoin'; valid are"),
         (["run", "swing", "--set", "resolution=ten"], "the value must be int"),
         (["run", "swing", "--set", "limit=1.01"], "a strain between 0 and 1 is valid"),
@@ -109,3 +110,20 @@ def test_list_names_solvers_and_scenarios(tmp_path):
     assert done.returncode == 0
     for word in ("clarabel", "gauss-seidel", "swing", "Thomaszewski"):
         assert word in done.stdout
+
+
+def test_answers_under_lower_bounds_are_reported_as_local(tmp_path):
+    pytest.importorskip("cyipopt", reason="ipopt is an optional extra")
+    words = "--set resolution=2 --set limit=10% --set compression=10% --steps 1 --results out"
+    solvers = ["--solver", "ipopt,gauss-seidel,clarabel"]
+    done = strainbench("run", "stretch-square", *solvers, *words.split(), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    local, reached = read_rows(tmp_path / "out" / STEPS, STEP_COLUMNS)
+    for step in (local, reached):
+        assert (step["outcome"], step["relative_gap"]) == ("feasible", "")
+    residuals = [json.loads(step["details"])["kkt_residual"] for step in (local, reached)]
+    assert residuals[0] < 1e-4 < residuals[1]
+    assert strainbench("report", "--results", "out", cwd=tmp_path).returncode == 0
+    table = (tmp_path / "out" / "table1.md").read_text()
+    for words in ("0 · local |", "at best a local optimum", "it has no form for lower bounds"):
+        assert words in table

@@ -80,6 +80,54 @@ def test_arrays_are_read_only_copies():
             array[0] = 0
 
 
+# --- lower bounds
+
+
+@pytest.mark.parametrize(
+    "limits",
+    [
+        StretchLimits.isotropic(1.1, 4, lower=0.9),
+        StretchLimits.orthotropic(1.1, 1.2, 1.3, lower=0.9),
+        StretchLimits.sampled([0.0, 0.5, 1.0, 1.5], np.full(4, 1.1), lower=0.9),
+    ],
+)
+def test_one_lower_bound_is_that_of_every_direction(limits):
+    np.testing.assert_array_equal(limits.lower, np.full(4, 0.9))
+
+
+def test_lower_bounds_merge_with_their_directions():
+    limits = StretchLimits.sampled(np.deg2rad([-90, 0, 90]), [1.1, 1.2, 1.1], [0.8, 0.9, 0.8])
+    np.testing.assert_array_equal(limits.lower, [0.8, 0.9])
+    with pytest.raises(ValueError, match=r"limits\.directions\[2\] repeats direction 0"):
+        StretchLimits.sampled(np.deg2rad([-90, 0, 90]), [1.1, 1.2, 1.1], [0.8, 0.9, 0.7])
+
+
+@pytest.mark.parametrize(
+    ("lower", "words"),
+    [
+        ([0.9, 0.0], r"limits\.lower\[1\] is 0"),
+        ([1.2, 0.9], r"limits\.lower\[0\] is 1\.2: at most the bound 1\.1"),
+        ([[0.9, 0.9], [0.9, 1.2]], r"limits\.lower\[1, 1\] is 1\.2: at most the bound 1\.1"),
+        ([0.9], r"limits\.lower: shape \(1,\).*2 directions"),
+        ([np.nan, 0.9], r"limits\.lower\[0\] is nan"),
+        ("0.9", r"limits\.lower: "),
+    ],
+)
+def test_bad_lower_bounds(lower, words):
+    with pytest.raises(ValueError, match=words):
+        StretchLimits(np.eye(2), [1.1, 1.1], lower=lower)
+
+
+def test_lower_bounds_are_for_as_many_elements_as_the_upper_ones():
+    with pytest.raises(ValueError, match=r"limits\.lower: 3 rows.*2"):
+        StretchLimits(np.eye(2), np.full((2, 2), 1.1), lower=np.full((3, 2), 0.9))
+
+
+def test_exact_limits_have_no_lower_bounds():
+    with pytest.raises(ValueError, match=r"limits\.lower"):
+        StretchLimits(np.eye(2), [1.1, 1.1], spectral=True, lower=[0.9, 0.9])
+
+
 # --- one direction given twice
 
 

@@ -44,6 +44,14 @@ def test_solves_as_numpy_does(rng, kind):
     np.testing.assert_allclose(solver.solve(b), np.linalg.solve(A, b), rtol=1e-9)
 
 
+def test_several_right_hand_sides_at_once(rng, kind):
+    A, lower = positive_definite(rng)
+    solver = kind(lower)
+    solver.factorise(lower.data)
+    b = rng.normal(size=(len(A), 3))
+    np.testing.assert_allclose(solver.solve(b), np.linalg.solve(A, b), rtol=1e-9)
+
+
 def test_the_pattern_serves_other_values(rng, kind):
     A, lower = positive_definite(rng)
     solver = kind(lower)

@@ -207,6 +207,40 @@ def test_tightened_lowers_every_bound_and_nothing_else(rng, per_element):
     np.testing.assert_array_equal(tight.target, problem.target)
 
 
+def test_lower_bounds_are_violated_from_below(rng):
+    rest, elements = square_grid(2, 1.0, "uniform")
+    limits = StretchLimits.isotropic(1.1, 4, lower=0.9)
+    target = np.column_stack([rest * [0.5, 1.3], np.zeros(len(rest))])
+    problem = Problem(rest, elements, target, limits)
+    assert not problem.convex
+    np.testing.assert_array_equal(problem.lower_bounds, np.full(problem.rows, 0.9))
+    violations = problem.violations(target).reshape(-1, 4)
+    diagonal = np.hypot(0.5, 1.3) / np.sqrt(2)
+    expected = [1.3 - 1.1, 0.0, 0.9 - 0.5, 0.0]  # weft, diagonal, warp, diagonal
+    assert 0.9 < diagonal < 1.1
+    np.testing.assert_allclose(violations, np.tile(expected, (len(elements), 1)), atol=1e-12)
+
+
+def test_without_lower_bounds_a_problem_is_convex(rng):
+    problem = random_problem(rng)
+    assert problem.convex
+    np.testing.assert_array_equal(problem.lower_bounds, np.zeros(problem.rows))
+
+
+def test_tightened_raises_lower_bounds():
+    limits = StretchLimits.orthotropic(1.1, 1.2, 1.3, lower=0.9)
+    rest, elements = square_grid(1, 1.0, "uniform")
+    problem = Problem(rest, elements, np.column_stack([rest, rest[:, 0]]), limits)
+    np.testing.assert_allclose(problem.tightened(1e-3).lower_bounds, 0.901, rtol=1e-12)
+
+
+def test_lower_bounds_are_for_as_many_elements_as_there_are():
+    rest, elements = square_grid(1, 1.0, "uniform")
+    limits = StretchLimits(np.eye(2), [1.1, 1.1], lower=np.full((3, 2), 0.9))
+    with pytest.raises(ValueError, match=r"limits\.lower: 3 rows for 2 elements"):
+        Problem(rest, elements, np.column_stack([rest, rest[:, 0]]), limits)
+
+
 def test_tightened_shortens_the_reach_of_the_pins():
     problem = triangle(pinned=[0, 1], target=1.08 * triangle().target)
     assert problem.infeasible_pins() is None

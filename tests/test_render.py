@@ -13,10 +13,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from strainbench import Problem, StretchLimits
+from strainbench.plan import plan_one
 from strainbench.render import FORMATS, Camera, Film, Picture, render, write_film
 from strainbench.render.animation import durations
 from strainbench.render.export import surface
-from strainbench.render.film import Frame, cells_to_draw, principal_stretches, shoot
+from strainbench.render.film import Frame, principal_stretches, shoot
 from strainbench.render.picture import DPI, SIZE, nice_above
 from strainbench.render.polar import admissible, directional_stretches, draw_polar, polar
 from tests.problems import random_problem, rotation
@@ -28,7 +29,7 @@ PIXELS = (round(SIZE[0] * DPI), round(SIZE[1] * DPI))
 
 @pytest.fixture(scope="module")
 def film():
-    (cell,) = cells_to_draw("swing", "clarabel", SMALL, 5, 1e-6)
+    cell = plan_one("swing", "clarabel", SMALL, 5, 1e-6)
     return shoot(cell, every=2)
 
 
@@ -299,7 +300,7 @@ POLAR = ["polar", "swing", "--set", "resolution=2", "--steps", "1"]
         ([*RENDER, "--steps", "0"], "--steps 0: a whole number above 0 is valid"),
         ([*RENDER, "--every", "0"], "--every 0: a whole number above 0 is valid"),
         ([*RENDER, "-o", "file/pictures"], "file/pictures cannot be written to"),
-        ([*RENDER, "--set", "limit=1%,2%"], "give 2 scenes: one is drawn at a time"),
+        ([*RENDER, "--set", "limit=1%,2%"], "give 2 scenes: one at a time"),
         ([*RENDER, "--solver", "none,clarabel"], "give 2 solvers (none, clarabel): one is valid"),
         ([*RENDER, "--scale", "-1"], "--scale -1: a strain above 0 is valid"),
         ([*RENDER, "--camera", "30"], "--camera 30: AZIMUTH,ELEVATION in degrees is valid"),
@@ -340,7 +341,7 @@ def test_obstacles_are_grey_surfaces_of_their_shape():
 def test_a_ball_hides_what_is_behind_it_and_cloth_in_front_hides_the_ball():
     from scenarios.collision import SPHERE, Collision
 
-    (cell,) = cells_to_draw("collision", "none", ["resolution=4"], 1, 1e-6)
+    cell = plan_one("collision", "none", ["resolution=4"], 1, 1e-6)
     film = shoot(cell)
     assert film.obstacles == Collision().contact().obstacles == (SPHERE,)
     bare = replace(film, obstacles=())

@@ -93,6 +93,16 @@ def test_the_norm_of_the_square_does_not_depend_on_the_unit_of_mass():
     np.testing.assert_allclose(a, b, atol=1e-5)
 
 
+def test_a_limit_on_compression_is_the_least_stretch_of_every_direction():
+    assert StretchSquare().problem().convex
+    problem = StretchSquare(resolution=3, compression=0.1).problem()
+    np.testing.assert_array_equal(problem.lower_bounds, np.full(problem.rows, 0.9))
+    with pytest.raises(ValueError, match=r"compression is 1\.5: a strain between 0 and 1"):
+        StretchSquare(compression=1.5)
+    with pytest.raises(ValueError, match="exact limits have none"):
+        StretchSquare(directions="exact", compression=0.1)
+
+
 @pytest.mark.parametrize("scale", [0.0, -1.0, float("nan")])
 def test_a_scale_that_is_not_one_is_named(scale):
     with pytest.raises(ValueError, match=f"scale_y is {scale}"):

@@ -41,10 +41,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solvers.newton_ipm.sampled import Change, SampledCones
+from solvers.newton_ipm.exact import ExactCones
+from solvers.newton_ipm.mesh import Change
+from solvers.newton_ipm.sampled import SampledCones
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
-from strainbench.physics.linear import best_linear_solver
+from strainbench.physics.linear import NotPositiveDefiniteError, best_linear_solver
 from strainbench.physics.pattern import Pattern
 from strainbench.reference import objective_floor
 
@@ -69,7 +71,8 @@ class NewtonIPM(Solver):
     |---|---|
     | solved | violation and relative gap are below the tolerance |
     | infeasible | the dual bound exceeds the objective of any point within the limits |
-    | stalled | neither got better in 12 iterations: rounding; the best iterate is returned |
+    | stalled | rounding: neither got better in 12 iterations, or K has no factor any more; the \
+best iterate is returned |
     | iteration limit, time limit | neither of these before |
 
     Parameters
@@ -79,6 +82,7 @@ class NewtonIPM(Solver):
     """
 
     name = "newton-ipm"
+    takes_exact = True
     variants = {"warm": {"warm": True}}
 
     warm: bool = False
@@ -111,6 +115,8 @@ class NewtonIPM(Solver):
         status = "iteration limit"
         for k in range(self.max_iterations + 1):
             error = iterate.measure()
+            if k:
+                monitor(iterate.x, iterate.Y)
             if error < best:
                 best, best_at, kept = error, k, (iterate.x, iterate.Y)
             if error <= tolerance:  # 2
@@ -127,8 +133,11 @@ class NewtonIPM(Solver):
             if k - best_at >= STALL and best < 1e-3:
                 status = "stalled"
                 break
-            iterate.step()
-            monitor(iterate.x)
+            try:
+                iterate.step()
+            except NotPositiveDefiniteError:  # K is, but for rounding
+                status = "stalled"
+                break
         x, Y = (iterate.x, iterate.Y) if kept is None else kept
         return Solution(x, status, k, Y)
 
@@ -139,7 +148,8 @@ class State:
     def __init__(self, problem: Problem) -> None:
         self.pattern = Pattern.of([problem.elements], problem.vertices, problem.pinned)
         self.linear = best_linear_solver(self.pattern.matrix())
-        self.cones = SampledCones(problem, self.pattern)
+        kind = ExactCones if problem.limits.spectral else SampledCones
+        self.cones: SampledCones | ExactCones = kind(problem, self.pattern)
         self.snapshot: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
         _ = problem.largest_objective  # its shortest paths are kept with the problem
 
@@ -229,7 +239,7 @@ class Iterate:
             dx, change = dx_new, new
         a = min(1.0, BACK_OFF * change.length)  # 6
         self.x = self.x + a * dx
-        cones.move(change, a)
+        cones.s, cones.l = cones.moved(change, a)
         cones.place(self.problem.bounds, self.x)
 
     def _direction(self, c: FloatArray, r: FloatArray) -> tuple[FloatArray, Change]:
@@ -241,6 +251,5 @@ class Iterate:
 
     def _snapshot(self, dx: FloatArray, change: Change) -> None:
         a = 0.9 * change.length
-        s, l = self.cones.s + a * change.s, self.cones.l + a * change.l  # noqa: E741
-        self.state.snapshot = (self.x + a * dx, s, l, self.target)
+        self.state.snapshot = (self.x + a * dx, *self.cones.moved(change, a), self.target)
         self.keep = False

@@ -1,4 +1,6 @@
-"""What each element adds to sums over the mesh; compiled into the loops that call it.
+"""What both kinds of limits share: a step, and what an element adds to sums over the mesh.
+
+The functions are compiled into the loops that call them.
 
 `corners` and `axes` are tuples of k and dim zeros: their lengths are known to the compiler, which
 then unrolls the loops over an element's vertices and material axes.
@@ -6,7 +8,26 @@ then unrolls the loops over an element's vertices and material axes.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from numba import njit
+
+from strainbench.limits import FloatArray
+
+
+@dataclass(frozen=True)
+class Change:
+    """What a step changes: numbers (rows,) for sampled limits, matrices (e, 3) for exact ones.
+
+    s, l : of slacks and multipliers
+    square : dy dy^T / 2, by which slacks fall short of their linearisation
+    length : the part of the step that reaches the boundary, at most 1
+    """
+
+    s: FloatArray
+    l: FloatArray  # noqa: E741
+    square: FloatArray
+    length: float
 
 
 @njit(cache=True)

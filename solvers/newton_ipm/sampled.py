@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numba import njit
 
-from solvers.newton_ipm.mesh import gather, spread, spread_blocks
+from solvers.newton_ipm.mesh import Change, gather, spread, spread_blocks
 from strainbench import Problem
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import Pattern
 
 ROUNDING = 1e-12
 """Residuals below it count as 0: divided by small slacks, rounding would floor the gap."""
-
-
-@dataclass(frozen=True)
-class Change:
-    """What a step changes.
-
-    s, l : of slacks and multipliers
-    square : |dy|^2 / 2, by which slacks fall short of their linearisation
-    length : the part of the step that reaches the boundary, at most 1
-    """
-
-    s: FloatArray
-    l: FloatArray  # noqa: E741
-    square: FloatArray
-    length: float
 
 
 class SampledCones:
@@ -140,10 +123,9 @@ class SampledCones:
         more: FloatArray = c + np.maximum(np.clip(after, low, high) - after, -high)
         return more
 
-    def move(self, change: Change, a: float) -> None:
-        """Take the part a of a step; `place` follows."""
-        self.s = self.s + a * change.s
-        self.l = self.l + a * change.l
+    def moved(self, change: Change, a: float) -> tuple[FloatArray, FloatArray]:
+        """Slacks and multipliers after the part a of a step."""
+        return self.s + a * change.s, self.l + a * change.l
 
 
 @njit(cache=True)

@@ -14,12 +14,14 @@ from __future__ import annotations
 
 import ctypes
 import importlib
+import weakref
 from abc import ABC, abstractmethod
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from strainbench.limits import FloatArray
@@ -53,7 +55,7 @@ class LinearSolver(ABC):
 
     @abstractmethod
     def solve(self, b: FloatArray) -> FloatArray:
-        """A^-1 b (n,) for the matrix that was factorised last."""
+        """A^-1 b, (n,) or (n, k), for the matrix that was factorised last."""
 
 
 def symmetric(lower: sp.csc_array) -> sp.csc_array:
@@ -132,7 +134,7 @@ class Cholmod(LinearSolver):
         """See the base class."""
         x = self._cvxopt.matrix(b)
         self._cholmod.solve(self._factor, x)
-        return np.array(x).ravel()
+        return np.array(x).reshape(b.shape)
 
 
 class Pardiso(LinearSolver):
@@ -148,8 +150,8 @@ class Pardiso(LinearSolver):
 
     def __init__(self, pattern: sp.csc_array) -> None:
         library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
-        self._pardiso = library.pardiso
-        self._pardiso.argtypes = None
+        self._function = library.pardiso
+        self._function.argtypes = None
         n = pattern.shape[0]
         columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
         self._below = np.flatnonzero(pattern.indices >= columns)
@@ -163,30 +165,19 @@ class Pardiso(LinearSolver):
         self._parameters[0] = 1  # these, not the defaults: minimum degree, no refinement
         self._parameters[34] = 1  # indices from 0
         self._call(self._ANALYSE)
+        weakref.finalize(self, _pardiso, self._matrix, self._RELEASE).atexit = False
+
+    @property
+    def _matrix(self) -> tuple[Any, ...]:
+        arrays = (self._values, self._starts, self._indices)
+        return self._function, self._memory, self._parameters, *arrays
 
     def _call(self, phase: int, b: FloatArray | None = None) -> FloatArray:
-        n = len(self._starts) - 1
-        b = np.zeros(n) if b is None else np.ascontiguousarray(b, dtype=np.float64)
-        x, permutation, error = np.empty(n), np.zeros(1, dtype=np.int32), ctypes.c_int32(0)
-        arrays = [self._values, self._starts, self._indices, permutation]
-        matrix = [a.ctypes.data_as(ctypes.c_void_p) for a in arrays]
-        numbers = [ctypes.byref(ctypes.c_int32(i)) for i in (1, 1, 2, phase, n)]
-        one, quiet = ctypes.byref(ctypes.c_int32(1)), ctypes.byref(ctypes.c_int32(0))
-        self._pardiso(
-            self._memory.ctypes.data_as(ctypes.c_void_p),
-            *numbers,
-            *matrix,
-            one,
-            self._parameters.ctypes.data_as(ctypes.c_void_p),
-            quiet,
-            b.ctypes.data_as(ctypes.c_void_p),
-            x.ctypes.data_as(ctypes.c_void_p),
-            ctypes.byref(error),
-        )
-        if error.value == self._NOT_POSITIVE:
+        x, error = _pardiso(self._matrix, phase, b)
+        if error == self._NOT_POSITIVE:
             raise NotPositiveDefiniteError(f"no Cholesky factor: column {self._parameters[29] - 1}")
-        if error.value:
-            raise RuntimeError(f"MKL Pardiso: error {error.value} in phase {phase}")
+        if error:
+            raise RuntimeError(f"MKL Pardiso: error {error} in phase {phase}")
         return x
 
     def factorise(self, data: FloatArray) -> None:
@@ -200,9 +191,29 @@ class Pardiso(LinearSolver):
         """See the base class."""
         return self._call(self._SOLVE, b)
 
-    def __del__(self) -> None:
-        if hasattr(self, "_parameters"):
-            self._call(self._RELEASE)
+
+def _pardiso(
+    matrix: tuple[Any, ...], phase: int, b: FloatArray | None = None
+) -> tuple[FloatArray, int]:
+    """x and the error code of MKL's function: one matrix, any right-hand sides, no output."""
+    function, memory, parameters, values, starts, indices = matrix
+    n = len(starts) - 1
+    b = np.zeros(n) if b is None else np.asfortranarray(b, dtype=np.float64)
+    x, permutation, error = np.empty_like(b), np.zeros(1, dtype=np.int32), ctypes.c_int32(0)
+
+    def number(value: int) -> Any:
+        return ctypes.byref(ctypes.c_int32(value))
+
+    def array(entries: NDArray[Any]) -> Any:
+        return entries.ctypes.data_as(ctypes.c_void_p)
+
+    kind = 2  # real, symmetric positive definite
+    function(
+        *(array(memory), number(1), number(1), number(kind), number(phase), number(n)),
+        *(array(values), array(starts), array(indices), array(permutation), number(b.size // n)),
+        *(array(parameters), number(0), array(b), array(x), ctypes.byref(error)),
+    )
+    return x, error.value
 
 
 PACKAGES: dict[type[LinearSolver], str] = {

@@ -9,13 +9,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from PIL import Image
 
+from strainbench.plan import plan_one
 from strainbench.records import open_folder
 from strainbench.render.animation import write_gif, write_mp4
 from strainbench.render.export import MESH_FORMATS, write_meshes
 from strainbench.render.film import (
     Film,
     Track,
-    cells_to_draw,
     shoot,
     untracked,
 )
@@ -81,14 +81,11 @@ def render(
         One line that names the wrong word and what is valid.
     """
     kinds = parse_formats(formats)
-    cells = cells_to_draw(scenario, solver, settings, steps, tolerance)
-    if len(cells) > 1:
-        labels = ", ".join(cell.solver.label for cell in cells)
-        raise ValueError(f"--solver and --set give {len(cells)} solvers ({labels}): one is valid")
+    cell = plan_one(scenario, solver, settings, steps, tolerance)
     if every < 1:
         raise ValueError(f"--every {every}: a whole number above 0 is valid")
     open_folder(folder, "-o")
-    film = shoot(cells[0], every, track)
+    film = shoot(cell, every, track)
     lines = [film.stopped] if film.stopped else []
     return lines + write_film(film, kinds, folder, camera, top, track)
 

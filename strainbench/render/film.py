@@ -12,7 +12,6 @@ import numpy as np
 from strainbench.cell import Cell
 from strainbench.limits import FloatArray
 from strainbench.physics.contact import Obstacle
-from strainbench.plan import plan
 from strainbench.problem import Problem
 from strainbench.scenario import ClothScenario
 from strainbench.solver import Solver, run_solver
@@ -65,29 +64,6 @@ def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
     """(e, dim) singular values of each deformation gradient, the largest first."""
     F = problem.deformation_gradients(positions)
     return np.asarray(np.linalg.svd(F, compute_uv=False), dtype=np.float64)
-
-
-def cells_to_draw(
-    scenario: str, solvers: str, settings: Iterable[str], steps: int, tolerance: float
-) -> list[Cell]:
-    """One scene with one set of values, and its solvers, from the words of a command line.
-
-    Raises
-    ------
-    ValueError
-        One line: a wrong word, several scenes where one is drawn, or an unavailable solver.
-    """
-    cells = plan([scenario], [solvers], list(settings), "simulate", steps, [tolerance], None)
-    scenes = {str(cell.scenario.identity) for cell in cells}
-    if len(scenes) > 1:
-        raise ValueError(
-            f"--set and {scenario} give {len(scenes)} scenes: one is drawn at a time, "
-            "so one value a setting is valid"
-        )
-    for cell in cells:
-        if cell.solver.unavailable:
-            raise ValueError(cell.solver.unavailable)
-    return cells
 
 
 def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:

@@ -15,9 +15,10 @@ from matplotlib.ticker import MaxNLocator
 from scipy.optimize import linprog
 
 from strainbench.limits import FloatArray, StretchLimits
+from strainbench.plan import plan_available
 from strainbench.problem import Problem
 from strainbench.records import open_folder
-from strainbench.render.film import Film, Track, cells_to_draw, shoot, untracked
+from strainbench.render.film import Film, Track, shoot, untracked
 from strainbench.report.chart import COLOURS
 
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -86,7 +87,7 @@ def polar(
     """
     if path.suffix not in SUFFIXES:
         raise ValueError(f"-o {path}: a name that ends in {', '.join(SUFFIXES)} is valid")
-    cells = cells_to_draw(scenario, solvers, settings, steps, tolerance)
+    cells = plan_available(scenario, solvers, settings, steps, tolerance)
     scene = cells[0].scenario.scenario()
     if scene.problem().rest.shape[1] != 2:
         raise ValueError(f"{scenario} is a volume: a scene of cloth is valid")

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
 GROUP = ["scenario", "mode", "setting", "tolerance", "steps_asked"]
@@ -19,6 +20,10 @@ what the referee found, at its worst over all steps: largest violation, relative
 certified lower bound, largest distance of a vertex from the reference optimum in mm, itself
 certified to within {error:.1g} mm. **Bold**:
 optimal on every step (violation at most {violation}, relative gap at most {gap})."""
+LOCAL = """
+*Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
+What such an answer is worth stands below: whether it is a local optimum, by the residual of the
+KKT conditions, and its objective beside the best known."""
 
 
 @dataclass(frozen=True)
@@ -92,16 +97,19 @@ def accuracy_text(row: pd.Series | None) -> str:
     """Violation, relative gap, distance in mm."""
     if row is None or pd.isna(row["max_violation"]):
         return ""
+    if pd.isna(row["relative_gap_max"]):
+        return f"{power(row['max_violation'])} · local"
     return " · ".join(
         (
-            _power(row["max_violation"]),
-            _power(row["relative_gap_max"]),
+            power(row["max_violation"]),
+            power(row["relative_gap_max"]),
             f"{1000 * row['distance_max']:.2g}",
         )
     )
 
 
-def _power(value: float) -> str:
+def power(value: float) -> str:
+    """One digit and a power of ten, as in 3e-9; 0 is 0."""
     return f"{value:.0e}".replace("e-0", "e-").replace("0e+00", "0").replace("e+00", "")
 
 
@@ -121,11 +129,12 @@ def tidy(runs: pd.DataFrame) -> pd.DataFrame:
 def explanation(runs: pd.DataFrame) -> str:
     """What the signs of a table mean."""
     thresholds = runs.iloc[0]
+    local = runs["max_violation"].notna() & runs["relative_gap_max"].isna()
     return EXPLANATION.format(
         violation=thresholds["violation_threshold"],
         gap=thresholds["gap_threshold"],
-        error=1000 * runs["reference_error_max"].max(),
-    )
+        error=1000 * np.nan_to_num(runs["reference_error_max"].max()),
+    ) + (LOCAL if local.any() else "")
 
 
 def reasons(runs: pd.DataFrame) -> list[str]:
@@ -175,7 +184,7 @@ def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
     if lines := [f"- {line}" for line in details(runs)]:
         parts.append("## Inside the solve, means\n\n" + "\n".join(lines))
     parts.append(_ledger_markdown(runs))
-    parts.append("## Machine\n\n" + "\n".join(_machine_line(n, f) for n, f in machines.items()))
+    parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
     return "\n\n".join(parts) + "\n"
 
 
@@ -200,7 +209,8 @@ def _line(cells: list[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _machine_line(name: str, facts: Mapping[str, object]) -> str:
+def machine_line(name: str, facts: Mapping[str, object]) -> str:
+    """A machine and its facts in one line."""
     packages = facts.get("packages")
     versions = packages.items() if isinstance(packages, Mapping) else ()
     return (

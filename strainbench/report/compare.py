@@ -1,0 +1,149 @@
+"""Two results folders, cell by cell: what became faster or slower, better or worse."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+from rich import box
+from rich.table import Table
+
+from strainbench.records import RecordsError, Row, latest_runs, open_folder
+from strainbench.report.pair import SAME, Pair
+
+MEASURES = ("outcome", "steps_done", "solve_seconds_mean", "max_violation", "relative_gap_max")
+HEADER = ("cells", "limit", "method", "outcome", "A [s]", "B [s]", "B/A", "violation", "gap")
+CSV_HEADER = (
+    *SAME,
+    *(f"{name}_{side}" for name in MEASURES for side in "ab"),
+    "seconds_ratio",
+    "only_in",
+    "note",
+)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The cells of two folders, those that both have and those that one has."""
+
+    names: tuple[str, str]
+    pairs: Sequence[Pair]
+
+    @property
+    def matched(self) -> list[Pair]:
+        """The cells in both."""
+        return [p for p in self.pairs if p.a and p.b]
+
+    def head(self) -> list[str]:
+        """Lines above the tables: other machines first."""
+        lines = []
+        machines = ["; ".join(sorted({r["machine"] for r in rows})) for rows in self._sides()]
+        if len(set(machines)) > 1:
+            here, there = machines
+            lines.append(
+                f"The machines differ, so times do not compare: A on {here}; B on {there}."
+            )
+        changed = sum(a["outcome"] != b["outcome"] for a, b in (p.both for p in self.matched))
+        lines.append(
+            f"A is {self.names[0]}, B is {self.names[1]}: {len(self.matched)} cells in both, "
+            f"{changed} with another outcome."
+        )
+        ratios = np.array([p.ratio for p in self.matched if p.ratio > 0])
+        if len(ratios):
+            mean = float(np.exp(np.log(ratios).mean()))
+            lines.append(
+                f"Seconds, B/A: geometric mean {mean:.2f}, from {ratios.min():.2f} to "
+                f"{ratios.max():.2f}, over the {len(ratios)} cells finished in both."
+            )
+        return lines
+
+    def _sides(self) -> Iterator[list[Row]]:
+        yield from (list(rows) for rows in zip(*(p.both for p in self.matched), strict=True))
+
+    def groups(self) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
+        """Titles and lines of the tables."""
+        for title, pairs in groupby(sorted(self.matched, key=self._order), lambda p: p.group):
+            yield title, [pair.cells() for pair in pairs]
+
+    def _order(self, pair: Pair) -> int:
+        """Cells of one group side by side, groups in the order of the first folder."""
+        return list(dict.fromkeys(p.group for p in self.matched)).index(pair.group)
+
+    def foot(self) -> list[str]:
+        """Lines below the tables."""
+        alone: dict[str, list[str]] = {}
+        for pair in self.pairs:
+            if not (pair.a and pair.b):
+                side = f"only in {'A' if pair.a else 'B'}"
+                about = f"{side}, {pair.group}, {pair.row['resolution']} cells, {pair.limit}"
+                alone.setdefault(about, []).append(pair.row["solver"])
+        return [p.note for p in self.matched if p.note] + [
+            f"{about}: {', '.join(solvers)}" for about, solvers in alone.items()
+        ]
+
+    def tables(self) -> Iterator[Table]:
+        """For the terminal."""
+        for title, lines in self.groups():
+            table = Table(title=title, title_justify="left", box=box.MARKDOWN)
+            for name in HEADER:
+                table.add_column(name, no_wrap=name == "method", overflow="fold")
+            for line in lines:
+                table.add_row(*line)
+            yield table
+
+    def markdown(self) -> str:
+        """All of it."""
+        parts = ["# Two results folders, cell by cell", *self.head()]
+        for title, lines in self.groups():
+            rows = [HEADER, ("---",) * len(HEADER), *lines]
+            parts += [f"## {title}", "\n".join(f"| {' | '.join(row)} |" for row in rows)]
+        if notes := self.foot():
+            parts.append("\n".join(f"- {note}" for note in notes))
+        return "\n\n".join(parts) + "\n"
+
+    def csv(self) -> str:
+        """One line a cell, those that one folder alone has too."""
+        buffer = io.StringIO()
+        writer = csv.DictWriter(buffer, CSV_HEADER, lineterminator="\n")
+        writer.writeheader()
+        for pair in self.pairs:
+            line: dict[str, object] = {name: pair.row[name] for name in SAME}
+            for side, row in (("a", pair.a), ("b", pair.b)):
+                line |= {f"{name}_{side}": row[name] if row else "" for name in MEASURES}
+            line["seconds_ratio"] = pair.ratio if pair.ratio > 0 else ""
+            line["only_in"] = "" if pair.a and pair.b else "a" if pair.a else "b"
+            writer.writerow(line | {"note": pair.note})
+        return buffer.getvalue()
+
+
+def compare(first: Path, second: Path) -> Comparison:
+    """The newest rows of both folders, cell by cell, in the order of the first.
+
+    Raises
+    ------
+    RecordsError
+        If a folder holds no results, or damaged ones.
+    """
+    sides = []
+    for folder in (first, second):
+        rows = latest_runs(folder).values()
+        if not rows:
+            raise RecordsError(f"{folder} holds no results to compare")
+        sides.append({tuple(row[name] for name in SAME): row for row in rows})
+    a, b = sides
+    pairs = [Pair(a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b])]
+    return Comparison((str(first), str(second)), pairs)
+
+
+def write_comparison(found: Comparison, path: Path) -> None:
+    """As CSV or Markdown, by what the name ends in; ValueError for another ending."""
+    forms = {".csv": found.csv, ".md": found.markdown}
+    if path.suffix not in forms:
+        raise ValueError(f"-o {path}: a name that ends in {', '.join(forms)} is valid")
+    open_folder(path.parent, "-o")
+    path.write_text(forms[path.suffix]())
