@@ -89,8 +89,9 @@ class SampledCones:
 
     def push(self, c: FloatArray, r: FloatArray) -> FloatArray:
         """(n, 3) G^T (h y), for products that are to change by c."""
-        self._r, self._h = r, (c - self.l * r) / self.s
-        return self.back(self._h[:, None] * self.y)
+        self._r, self._h, out = r, np.empty(self.degree), np.zeros((self._n, 3))
+        add_push(*self._mesh, self._d, c, r, self.s, self.l, self.y, self._h, out)
+        return out
 
     def change(self, dx: FloatArray) -> Change:
         """The rest of the step, after `push` and the linear solve."""
@@ -153,6 +154,23 @@ def add_back(elements, gradients, corners, axes, d, Y, out):  # type: ignore[no-
             for c in range(len(axes)):
                 for i in range(3):
                     P[c, i] += d[j, c] * Y[e * m + j, i]
+        spread(elements, gradients, corners, axes, e, P, out)
+
+
+@njit(cache=True)
+def add_push(elements, gradients, corners, axes, d, c, r, s, l, y, h, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """h = (c - l r)/s, and G^T (h y) added to `out` (n, 3)."""
+    m = len(d)
+    P = np.empty((len(axes), 3))
+    for e in range(len(elements)):
+        P[:] = 0.0
+        for j in range(m):
+            k = e * m + j
+            h[k] = (c[k] - l[k] * r[k]) / s[k]
+            for a in range(len(axes)):
+                weight = d[j, a] * h[k]
+                for i in range(3):
+                    P[a, i] += weight * y[k, i]
         spread(elements, gradients, corners, axes, e, P, out)
 
 
