@@ -66,10 +66,14 @@ class Admm(Solver):
         in place of the optimal ones. "residuals" is the textbook's: all rho_i equal, doubled or
         halved where one residual exceeds the other ten times (Boyd et al. 2011, Eq. 3.13).
     relaxation : alpha.
-    memory : former iterates in Anderson acceleration; 0 is none.
+    memory : former iterates in Anderson acceleration; 0 is none. With 6 it saves a tenth to a half
+        of the iterations on the swing, each of which then takes two to three times as long.
     warm : start from the frame before: its multipliers, and its positions moved as the target has
         moved. On frames 10 to 30 of the swing at 20 cells, 1%, 855 iterations become 725
         (medians), and the worst frame's 3690 become 1220; to carry rho over too gains nothing.
+
+    It reaches gaps of 1e-6 in 300 to 5000 iterations on frames of the swing at 10 to 40 cells, 1%
+    and 0.1%; the violation of x is often the last to fall.
     """
 
     name = "admm"
