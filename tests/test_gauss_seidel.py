@@ -168,7 +168,7 @@ def test_clamping_principal_stretches_leads_away_from_no_point_within_the_limits
     solve(
         problem,
         GaussSeidel("principal", max_sweeps=64),
-        watch=lambda seconds, x, multipliers: points.append(x),
+        watch=lambda seconds, iterations, x, multipliers: points.append(x),
     )
     distances = [problem.weights @ np.sum((x - placed) ** 2, axis=1) for x in points]
     assert len(points) > 2
