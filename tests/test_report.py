@@ -20,8 +20,8 @@ from strainbench.records import (
 from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
 from strainbench.report.energy import energies
-from strainbench.report.sweep import sweeps
-from strainbench.report.table import accuracy_text, groups, mark, time_text
+from strainbench.report.sweep import beyond, sweeps
+from strainbench.report.table import accuracy_text, groups, ledger, mark, time_text
 
 
 def row(solver, **changes):
@@ -176,6 +176,27 @@ def test_three_values_of_a_setting_make_a_sweep(tmp_path):
         "| 0.01",
         "| 0.1",
     ]
+
+
+def test_exact_directions_come_last_in_their_sweep_and_the_true_stretch_shows(tmp_path):
+    stretches = {"exact": 1.01, 8: 1.016, 2: 1.25, 4: 1.04}
+    swept = [
+        row("good", directions=m, scenario_parameters=json.dumps({"directions": m}))
+        | {"max_principal_stretch": stretch, "needs": "gravity", "variables": 9, "nonzeros": 9}
+        for m, stretch in stretches.items()
+    ]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, swept)
+    runs = load_runs(tmp_path)
+    assert list(sweeps(runs)) == ["directions"]
+    assert sweeps(runs)["directions"]["shown"].tolist() == ["2", "4", "8", "exact"]
+    assert beyond(sweeps(runs)["directions"]).tolist() == pytest.approx([0.24, 0.03, 0.006, 0])
+    write_report(tmp_path)
+    lines = (tmp_path / "sweeps.md").read_text().splitlines()[-4:]
+    assert [line.split(" | ")[0] for line in lines] == ["| 2", "| 4", "| 8", "| exact"]
+    assert [line.split(" | ")[-1] for line in lines] == ["0.24 |", "0.03 |", "0.006 |", "0 |"]
+    drawn = "".join(ElementTree.parse(tmp_path / "sweep-directions.svg").getroot().itertext())
+    assert "exact" in drawn
+    assert set(ledger(runs)["directions"]) == {"2", "4", "8", "exact"}
 
 
 def test_scenes_with_other_settings_have_tables_of_their_own(tmp_path):
