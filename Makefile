@@ -6,10 +6,13 @@ BIN    := $(VENV)/bin
 LOCAL  := results/local
 BENCH  ?= $(LOCAL)/bench
 PAPER  ?= $(LOCAL)/paper
+FAILURES ?= $(LOCAL)/failures
+DIRECTIONS ?= $(LOCAL)/directions
 ALL    := --solver all
+HARD   := --time-limit 20 --results $(FAILURES)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper test check perf report clean
+.PHONY: help setup bench bench-paper failures directions certificates test check perf report clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -25,6 +28,24 @@ bench-paper: setup ## the paper's whole grid, 100 steps; hours, resumable, 10 mi
 	$(BIN)/strainbench run swing $(ALL) --set resolution=10,20,40,60 --set limit=1%,10% \
 		--steps 100 --time-limit 600 --results $(PAPER)
 	$(BIN)/strainbench report --results $(PAPER)
+
+failures: setup ## where methods fail: hard cases beside easier neighbours; an hour, resumable
+	$(BIN)/strainbench run twist $(ALL) --set resolution=10 --set turn_rate=1200,300 --steps 1 $(HARD)
+	$(BIN)/strainbench run stress $(ALL) --set resolution=10 --steps 3 $(HARD) \
+		--set case=slivers,mass-ratio,displaced,fast-pins --set severity=1,0.1
+	$(BIN)/strainbench run stretch-square $(ALL) --set resolution=10 --set scale_x=2,1.1 --steps 1 $(HARD)
+	$(BIN)/strainbench run swing $(ALL) --set resolution=10 --set limit=1%,0.1%,0.01% --steps 10 \
+		--mode replay $(HARD)
+	$(BIN)/strainbench report --results $(FAILURES)
+
+directions: setup ## what sampled directions cost, and how far the true stretch goes beyond them
+	$(BIN)/strainbench run swing --solver newton-ipm,clarabel,admm,gauss-seidel-principal --mode replay \
+		--set resolution=10 --set directions=2,4,8,18,36,exact --steps 10 --time-limit 60 \
+		--results $(DIRECTIONS)
+	$(BIN)/strainbench report --results $(DIRECTIONS)
+
+certificates: setup ## 200 random problems with all solvers: no certificate contradicted; an hour
+	$(BIN)/python -m pytest -q tests/test_certificates.py --problems 200
 
 test: setup ## the tests
 	$(BIN)/python -m pytest -q
