@@ -9,7 +9,7 @@ PAPER  ?= $(LOCAL)/paper
 FAILURES ?= $(LOCAL)/failures
 DIRECTIONS ?= $(LOCAL)/directions
 ALL    := --solver all
-HARD   := --time-limit 20 --results $(FAILURES)
+HARD   := $(ALL) --set resolution=10 --time-limit 20 --results $(FAILURES)
 
 .DEFAULT_GOAL := help
 .PHONY: help setup bench bench-paper failures directions certificates test check perf report clean
@@ -30,12 +30,12 @@ bench-paper: setup ## the paper's whole grid, 100 steps; hours, resumable, 10 mi
 	$(BIN)/strainbench report --results $(PAPER)
 
 failures: setup ## where methods fail: hard cases beside easier neighbours; an hour, resumable
-	$(BIN)/strainbench run twist $(ALL) --set resolution=10 --set turn_rate=1200,300 --steps 1 $(HARD)
-	$(BIN)/strainbench run stress $(ALL) --set resolution=10 --steps 3 $(HARD) \
-		--set case=slivers,mass-ratio,displaced,fast-pins --set severity=1,0.1
-	$(BIN)/strainbench run stretch-square $(ALL) --set resolution=10 --set scale_x=2,1.1 --steps 1 $(HARD)
-	$(BIN)/strainbench run swing $(ALL) --set resolution=10 --set limit=1%,0.1%,0.01% --steps 10 \
-		--mode replay $(HARD)
+	$(BIN)/strainbench run twist $(HARD) --set turn_rate=1200,300 --steps 1
+	$(BIN)/strainbench run stress $(HARD) --set case=slivers,mass-ratio,displaced \
+		--set severity=1,0.1 --steps 1
+	$(BIN)/strainbench run stress $(HARD) --set case=fast-pins --set severity=1,0.1 --steps 3
+	$(BIN)/strainbench run stretch-square $(HARD) --set scale_x=2,1.1 --steps 1
+	$(BIN)/strainbench run swing $(HARD) --set limit=1%,0.1%,0.01% --steps 10 --mode replay
 	$(BIN)/strainbench report --results $(FAILURES)
 
 directions: setup ## what sampled directions cost, and how far the true stretch goes beyond them

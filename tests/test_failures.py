@@ -170,6 +170,14 @@ def test_the_report_writes_the_table(folder):
     assert f"- weak: violated by 3e-3, says iteration limit; optimal at {METHODS}" in text
 
 
+def test_runs_of_one_case_in_other_ways_are_cases_of_their_own(folder):
+    longer = scene_row("weak", HARD, "optimal", steps_asked=20) | {"cell": "longer"}
+    append_rows(folder / RUNS, RUN_COLUMNS, [longer])
+    table = failures(folder, load_runs(folder)).set_index(["case", "method"])
+    assert table.loc[(f"{STRESS}, steps_asked 20", "weak")]["sign"] == "✓"
+    assert table.loc[(f"{STRESS}, steps_asked 10", "weak")]["sign"] == "✗"
+
+
 def test_a_folder_without_hard_cases_has_no_table(tmp_path):
     append_rows(tmp_path / RUNS, RUN_COLUMNS, [scene_row("best", EASY, "optimal"), row("mine")])
     assert not len(failures(tmp_path, load_runs(tmp_path)))

@@ -27,6 +27,7 @@ infeasible case called solved, or no usable answer. What is shown is the worst s
 
 Each failure is checked on an easier neighbour of its case. Where the method does better there, the
 failure is the method's. †: it does no better there, by its nature or by a fault of ours."""
+RUN = ("scenario", "mode", "steps_asked", "tolerance")
 PASSED, PARTLY, FAILED = "✓", "○", "✗"
 COLUMNS = ("case", "method", "sign", "found", "neighbour", "verdict", "reason")
 
@@ -42,13 +43,21 @@ class Case:
 
 def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """A line for each method on each hard case of a results folder; see COLUMNS."""
-    says = _statuses(folder)
-    titles = _cases(runs)
-    keys = ["scenario_parameters", "solver", "mode", "steps_asked", "tolerance", "scenario"]
+    says, cases = _statuses(folder), _cases(runs)
+    keys = ["scenario_parameters", "solver", *RUN]
     by_key = {tuple(row[keys]): row for _, row in runs.iterrows()}
     lines = []
-    for parameters, case in titles.items():
-        rows = runs[runs["scenario_parameters"] == parameters]
+    for (parameters, *how), rows in runs.groupby(["scenario_parameters", *RUN], sort=False):
+        case = cases.get(str(parameters))
+        if case is None:
+            continue
+        alike = runs[runs["scenario_parameters"] == parameters]
+        title = ", ".join(
+            [
+                case.title,
+                *(_setting(k, v) for k, v in zip(RUN, how, strict=True) if alike[k].nunique() > 1),
+            ]
+        )
         infeasible = rows["reason"].str.contains("projections: infeasible:", regex=False).any()
         for _, row in rows[rows["solver"] != UNCONSTRAINED].iterrows():
             if row["reason"].startswith("unavailable"):
@@ -58,7 +67,7 @@ def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
             easier = by_key.get((case.neighbour, *row[keys[1:]]))
             verdict = "" if sign == PASSED else _verdict(row, easier, case.apart)
             there = "" if easier is None else easier["outcome"]
-            line = (case.title, row["solver"], sign, found, there, verdict, row["reason"])
+            line = (title, row["solver"], sign, found, there, verdict, row["reason"])
             lines.append(dict(zip(COLUMNS, line, strict=True)))
     return pd.DataFrame(lines, columns=list(COLUMNS))
 
