@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from strainbench import certify, solve
-from strainbench.discovery import find_scenario
+from strainbench.discovery import find_scenario, find_solver
 from strainbench.mesh import lumped_areas
 from strainbench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows
 from strainbench.report import load_runs, write_report
 from strainbench.report.failures import failures
+from strainbench.solver import run_solver
 from tests.test_report import row
 
 Stress = find_scenario("stress")
@@ -54,6 +55,20 @@ def test_severity_is_what_it_says():
     first, second = candidates(Stress(case="fast-pins"), 2)
     pinned = heavy.sheet()[3]
     assert np.linalg.norm(second - first, axis=1)[pinned] / Stress().edge == pytest.approx(2)
+
+
+def test_qoco_answers_a_later_frame_like_the_first():
+    scene, solver = Stress(case="fast-pins", severity=0.1), find_solver("qoco")
+    problem = scene.problem()
+    state = solver.prepare(problem)
+
+    def project(target):
+        frame = problem.with_target(target)
+        used, fresh = (run_solver(solver, frame, s, 1e-6) for s in (state, solver.prepare(frame)))
+        assert np.abs(used.positions - fresh.positions).max() < 1e-9 * scene.edge
+        return fresh.positions
+
+    list(islice(scene.play(project), 2))
 
 
 @pytest.mark.parametrize("change", [{"case": "odd"}, {"severity": -1.0}, {"seed": -1}])
