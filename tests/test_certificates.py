@@ -1,5 +1,6 @@
 """No certificate is contradicted by any solver's answer, on random irregular problems.
 
+Each of 50 problems goes to every third solver, so that each solver has 16 or 17 of them.
 `pytest tests/test_certificates.py --problems 200` checks 200 of them with all solvers, and prints
 what became of the answers; `make certificates` does that.
 """

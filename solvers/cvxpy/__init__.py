@@ -69,7 +69,7 @@ class Cvxpy(Solver):
         """A reason, where the backend is missing or has no semidefinite cones."""
         if problem.limits.spectral and self.backend not in SEMIDEFINITE:
             return f"{self.backend} has no semidefinite cones, which exact limits need"
-        return self.missing()
+        return super().supports(problem) or self.missing()
 
     def prepare(self, problem: Problem) -> Model | None:
         """The compiled model; None where all vertices are pinned."""

@@ -60,6 +60,7 @@ LOW, HIGH = 0.1, 5.0  # products aimed at by correctors, in sigma mu
 BACK_OFF = 0.99
 SNAPSHOT = 0.1  # relative gap
 PATIENCE = 25  # iterations after which a warm start is given up
+STRICTER = 100.0  # limits must hold so much better than the gap: they do, but for the last steps
 STALL = 12  # iterations without progress
 
 
@@ -87,6 +88,12 @@ best iterate is returned |
 
     warm: bool = False
     max_iterations: int = 200
+
+    def supports(self, problem: Problem) -> str | None:
+        """A reason, where limits are exact and elements are not triangles."""
+        if problem.limits.spectral and problem.elements.shape[1] != 3:
+            return "its exact limits are those of triangles"
+        return super().supports(problem)
 
     def prepare(self, problem: Problem) -> State:
         """Sparsity, ordering and symbolic factorisation."""
@@ -211,7 +218,7 @@ class Iterate:
         priced = objective - bound + float(norms @ np.maximum(excess, 0.0))
         self.gap = max(0.0, priced) / max(bound, self.floor)
         self.violation = float(np.max(excess))
-        return max(self.violation, self.gap)
+        return max(STRICTER * self.violation, self.gap)
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""

@@ -12,6 +12,8 @@ with A_ki = sym((R^-1 Y_i)(R^-1 B_k)^T). Symmetric matrices are stored as their 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
 
@@ -154,11 +156,10 @@ class ExactCones:
     def centrality(
         self, c: FloatArray, change: Change, a: float, low: float, high: float
     ) -> FloatArray:
-        """c with what moves the diagonal products after the part a of a step into [low, high]."""
-        after = symmetric_product(*self._after(change, a))[:, :2]
-        more = c.copy()
-        more[:, :2] += np.maximum(np.clip(after, low, high) - after, -high)
-        return more
+        """c with what moves the products after the part a of a step into [low, high]."""
+        after = symmetric_product(*self._after(change, a))
+        wanted = mapped(after, lambda p: p + np.maximum(np.clip(p, low, high) - p, -high))
+        return c + wanted - after
 
     def moved(self, change: Change, a: float) -> tuple[FloatArray, FloatArray]:
         """Slacks and multipliers after the part a of a step."""
@@ -174,17 +175,22 @@ def eigenvalues(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     return mean - apart, mean + apart
 
 
+def mapped(A: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Symmetric matrices (e, 3) with a function's values for eigenvalues.
+
+    It is linear in A and I: the line through the values at both eigenvalues.
+    """
+    low, high = eigenvalues(A)
+    at_low, at_high = function(low), function(high)
+    slope = (at_high - at_low) / np.where(high > low, high - low, 1.0)
+    out: FloatArray = slope[:, None] * A
+    out[:, :2] += (at_high - slope * high)[:, None]
+    return out
+
+
 def widened(A: FloatArray, B: FloatArray) -> FloatArray:
     """A + (B - A)_+, above both A and B: the larger one where they are numbers."""
-    D = B - A
-    low, high = eigenvalues(D)
-    spread = np.where(high > low, high - low, 1.0)
-    up, down = np.maximum(high, 0.0), np.maximum(low, 0.0)
-    # D_+ is linear in D and I, such that the eigenvalues low and high become down and up
-    slope = np.where(high > low, (up - down) / spread, 0.0)
-    wide: FloatArray = A + slope[:, None] * D
-    wide[:, :2] += (up - slope * high)[:, None]
-    return wide
+    return A + mapped(B - A, lambda d: np.maximum(d, 0.0))
 
 
 def congruent(R: FloatArray, A: FloatArray) -> FloatArray:

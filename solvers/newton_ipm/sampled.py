@@ -10,7 +10,7 @@ from strainbench import Problem
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import Pattern
 
-ROUNDING = 1e-12
+ROUNDING = 1e-14
 """Residuals below it count as 0: divided by small slacks, rounding would floor the gap."""
 
 
