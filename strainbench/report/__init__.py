@@ -67,7 +67,7 @@ def write_report(folder: Path) -> list[Path]:
     if len(failed):
         paths |= {n: folder / n for n in ("failures.csv", "failures.md")}
         failed.to_csv(paths["failures.csv"], index=False)
-        paths["failures.md"].write_text(failures_markdown(failed, machines))
+        paths["failures.md"].write_text(failures_markdown(failed, runs, machines))
     if table := energy_markdown(folder, runs):
         paths["energy.md"] = folder / "energy.md"
         paths["energy.md"].write_text(table)

@@ -20,13 +20,15 @@ from strainbench.referee import OUTCOMES
 from strainbench.report.table import UNCONSTRAINED, machine_line, power
 
 EXPLANATION = """\
-Signs: ✓ optimal on every step, or an infeasible case called infeasible; ○ within the limits but
-not optimal (relative gap, distance of the farthest vertex), or an infeasible case on which the
-method gave up without a claim; ✗ limits violated (by how much, and what the method itself says), an
-infeasible case called solved, or no usable answer. What is shown is the worst step.
+Signs: ✓ optimal on every step (violation at most {violation}, relative gap at most {gap}), or an
+infeasible case called infeasible; ○ within the limits but not optimal (relative gap, distance of
+the farthest vertex), or an infeasible case on which the method gave up without a claim; ✗ limits
+violated (by how much, and what the method itself says), an infeasible case called solved, or no
+usable answer. What is shown is the worst step.
 
-Each failure is checked on an easier neighbour of its case. Where the method does better there, the
-failure is the method's. †: it does no better there, by its nature or by a fault of ours."""
+Each failure is checked on an easier neighbour of its case. Where the method does better there, and
+within the limits, the failure is the method's. †: it does not, by its nature or by a fault of
+ours."""
 RUN = ("scenario", "mode", "steps_asked", "tolerance")
 PASSED, PARTLY, FAILED = "✓", "○", "✗"
 COLUMNS = ("case", "method", "sign", "found", "neighbour", "verdict", "reason")
@@ -139,18 +141,23 @@ def _verdict(row: pd.Series, easier: pd.Series | None, apart: str) -> str:
         return "refused"
     if easier is None:
         return f"not run at {apart}"
-    if OUTCOMES.index(easier["outcome"]) < OUTCOMES.index(row["outcome"]):
+    here, there = (OUTCOMES.index(r["outcome"]) for r in (row, easier))
+    if there < min(here, OUTCOMES.index("violated")):
         return f"{easier['outcome']} at {apart}: the method's"
     return f"{easier['outcome']} at {apart} too: by its nature, or a fault of ours"
 
 
-def failures_markdown(table: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
+def failures_markdown(
+    table: pd.DataFrame, runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
+) -> str:
     """Methods against cases, what the signs mean, a line for each failure, the machine."""
     cases, methods = list(dict.fromkeys(table["case"])), list(dict.fromkeys(table["method"]))
     cells = {(r["case"], r["method"]): _cell(r) for _, r in table.iterrows()}
     lines = [["method", *cases], ["---"] * (1 + len(cases))]
     lines += [[m, *(cells.get((c, m), "") for c in cases)] for m in methods]
-    parts = ["# Where methods fail", EXPLANATION]
+    first = runs.iloc[0]
+    limits = {"violation": first["violation_threshold"], "gap": first["gap_threshold"]}
+    parts = ["# Where methods fail", EXPLANATION.format(**limits)]
     parts.append("\n".join("| " + " | ".join(line) + " |" for line in lines))
     for case, rows in table[table["sign"] != PASSED].groupby("case", sort=False):
         reasons = [
