@@ -16,7 +16,8 @@ Since |y_i| >= a_i . y_i, each linearised set holds the feasible one: no step is
 limits that cannot be met, and there is no line search. Without H the steps are those of the plain
 linearisation. These do not converge: the curvature of the limits that H stands for is larger than
 M, so that x leaps from side to side. With the cuts of all former steps kept they do, in 8 steps
-at 10 cells and 15 at 20 where H needs 4 and 7, and with up to seven times the rows.
+at 10 cells where H needs 4; at 20 cells, where H needs 7, violation and gap were 1e-6 and 9e-6
+after 15, with up to seven times the rows.
 """
 
 from __future__ import annotations

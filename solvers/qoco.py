@@ -22,13 +22,13 @@ from strainbench.conic import ConicForm
 class Qoco(Solver):
     """Interior-point second-order cone programming (Tang et al. 2022, Eq. 12; QOCO).
 
-    What `clarabel` solves, see `strainbench.conic`. Called without cvxpy it takes 0.6 to 0.9 of the
-    time, and its last iterate is kept where it ends with a numerical error, which cvxpy takes for
-    no answer: close to a gap of 1e-6 its linear systems get too ill-conditioned to go on. It
-    neither looks at a clock nor detects that limits cannot be met. It is set up anew for each
-    projection, a twentieth of the time: with constants updated instead (version 0.3.2), runs that
-    end as QOCO_SOLVED_INACCURATE take the same iterations to an answer that is wrong, by up to a
-    quarter of an edge with the fast pins of `stress`.
+    What `clarabel` solves, see `strainbench.conic`. Called without cvxpy it takes as long or less
+    (0.6 to 1 of the time), and its last iterate is kept where it ends with a numerical error, which
+    cvxpy takes for no answer: close to a gap of 1e-6 its linear systems get too ill-conditioned to
+    go on. It neither looks at a clock nor detects that limits cannot be met. It is set up anew for
+    each projection, a twentieth of the time: with constants updated instead (version 0.3.2), runs
+    that end as QOCO_SOLVED_INACCURATE take the same iterations to an answer that is wrong, by up to
+    a quarter of an edge with the fast pins of `stress`.
 
     Parameters
     ----------

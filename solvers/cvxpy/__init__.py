@@ -39,7 +39,7 @@ class Cvxpy(Solver):
     backend : "CLARABEL", "ECOS", "SCS", "QOCO" or "MOSEK", where installed. SCS, a first-order
         method, needs 1e3 to 2e4 iterations for a gap of 1e-6 at 10 cells, whatever its scale,
         relaxation or acceleration, and reaches its limit of 1e5 on some problems. QOCO's iterate
-        is lost where it ends with a numerical error, about one frame in six.
+        is lost where it ends with a numerical error.
     settings : "tuned" as above, or "default": s M = 1 kg and metres as they are, and the
         backend's own tolerances.
     """
