@@ -21,7 +21,7 @@ from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
 from strainbench.report.energy import energies
 from strainbench.report.sweep import beyond, sweeps
-from strainbench.report.table import accuracy_text, groups, ledger, mark, time_text
+from strainbench.report.table import accuracy_text, explanation, groups, ledger, mark, time_text
 
 
 def row(solver, **changes):
@@ -95,6 +95,12 @@ def test_accuracy_stands_beside_the_time(by_solver):
     assert accuracy_text(by_solver["good"]) == "3e-9 · 2e-6 · 0.004"
     assert accuracy_text(by_solver["absent"]) == ""
     assert accuracy_text(None) == ""
+
+
+def test_infeasible_frames_have_no_part_in_the_references_error(folder):
+    torn = row("torn", outcome="violated", reference_error_max="inf", projections_violated=1)
+    append_rows(folder / RUNS, RUN_COLUMNS, [torn])
+    assert "certified to within 0.03 mm" in " ".join(explanation(load_runs(folder)).split())
 
 
 def test_the_table_has_the_papers_shape(folder):
