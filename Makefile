@@ -7,11 +7,14 @@ LOCAL  := results/local
 BENCH  ?= $(LOCAL)/bench
 PAPER  ?= $(LOCAL)/paper
 FIELD  ?= $(LOCAL)/field
+FAILURES ?= $(LOCAL)/failures
+DIRECTIONS ?= $(LOCAL)/directions
+HARD   := --set resolution=10 --time-limit 20 --results $(FAILURES)
 TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipopt,ipopt-default \
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field test check perf report clean
+.PHONY: help setup bench bench-paper field failures directions certificates test check perf report clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -32,6 +35,24 @@ field: setup ## every method on the same frames: swing at 20 and 40 cells, 1%; h
 	$(BIN)/strainbench run swing --mode replay --set resolution=20,40 --steps 10 \
 		--time-limit 60 --results $(FIELD)
 	$(BIN)/strainbench report --results $(FIELD)
+
+failures: setup ## where methods fail: hard cases beside easier neighbours; an hour, resumable
+	$(BIN)/strainbench run twist $(HARD) --set turn_rate=1200,300 --steps 1
+	$(BIN)/strainbench run stress $(HARD) --set case=slivers,mass-ratio,displaced \
+		--set severity=1,0.1 --steps 1
+	$(BIN)/strainbench run stress $(HARD) --set case=fast-pins --set severity=1,0.1 --steps 3
+	$(BIN)/strainbench run stretch-square $(HARD) --set scale_x=2,1.1 --steps 1
+	$(BIN)/strainbench run swing $(HARD) --set limit=1%,0.1%,0.01% --steps 10 --mode replay
+	$(BIN)/strainbench report --results $(FAILURES)
+
+directions: setup ## what sampled directions cost, and how far the true stretch goes beyond them
+	$(BIN)/strainbench run swing --solver newton-ipm,clarabel,admm,gauss-seidel-principal --mode replay \
+		--set resolution=10 --set directions=2,4,8,18,36,exact --steps 10 --time-limit 60 \
+		--results $(DIRECTIONS)
+	$(BIN)/strainbench report --results $(DIRECTIONS)
+
+certificates: setup ## 200 random problems with all solvers: no certificate contradicted; an hour
+	$(BIN)/python -m pytest -q tests/test_certificates.py --problems 200
 
 test: setup ## the tests
 	$(BIN)/python -m pytest -q

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from strainbench.limits import FloatArray
 from strainbench.mesh import square_grid
 from strainbench.problem import IntArray, longest_edges
-from strainbench.scenario import SheetScenario, StepReport
+from strainbench.scenario import Scenario, SheetScenario, StepReport
 
 SIDE = 0.5  # [m]
 
@@ -53,6 +53,11 @@ class Twist(SheetScenario):
             raise ValueError(f"turn_rate is {self.turn_rate}: a finite number is valid")
         if not 0 < self.step < float("inf"):
             raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
+
+    def easier(self) -> Scenario | None:
+        """See the base class: a quarter of the angle, where the first step is past the limit."""
+        past = np.deg2rad(abs(self.turn_rate)) * self.step >= self.infeasible_angle
+        return replace(self, turn_rate=self.turn_rate / 4) if past else super().easier()
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class; the axis is x."""

@@ -1,9 +1,39 @@
-"""Fixtures shared by the tests."""
+"""Fixtures and options shared by the tests."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+
+from tests.tally import Tally
+
+TALLY = pytest.StashKey[Tally]()
+
+
+def pytest_addoption(parser):
+    parser.addoption(
+        "--problems",
+        type=int,
+        metavar="N",
+        help="check certificates on N random problems with all solvers, and print what became of "
+        "the answers; by default 50 problems with a third of the solvers each",
+    )
+
+
+def pytest_configure(config):
+    config.stash[TALLY] = Tally()
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    if config.getoption("problems") is not None:
+        terminalreporter.section("certificates on random problems")
+        for line in config.stash[TALLY].lines():
+            terminalreporter.write_line(line)
+
+
+@pytest.fixture
+def tally(request):
+    return request.config.stash[TALLY]
 
 
 @pytest.fixture

@@ -20,8 +20,16 @@ from strainbench.records import (
 from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
 from strainbench.report.energy import energies
-from strainbench.report.sweep import sweeps
-from strainbench.report.table import accuracy_text, as_markdown, groups, mark, time_text
+from strainbench.report.sweep import beyond, sweeps
+from strainbench.report.table import (
+    accuracy_text,
+    as_markdown,
+    explanation,
+    groups,
+    ledger,
+    mark,
+    time_text,
+)
 from strainbench.report.warm import pairs
 
 
@@ -96,6 +104,12 @@ def test_accuracy_stands_beside_the_time(by_solver):
     assert accuracy_text(by_solver["good"]) == "3e-9 · 2e-6 · 0.004"
     assert accuracy_text(by_solver["absent"]) == ""
     assert accuracy_text(None) == ""
+
+
+def test_infeasible_frames_have_no_part_in_the_references_error(folder):
+    torn = row("torn", outcome="violated", reference_error_max="inf", projections_violated=1)
+    append_rows(folder / RUNS, RUN_COLUMNS, [torn])
+    assert "certified to within 0.03 mm" in " ".join(explanation(load_runs(folder)).split())
 
 
 def test_the_table_has_the_papers_shape(folder):
@@ -177,6 +191,27 @@ def test_three_values_of_a_setting_make_a_sweep(tmp_path):
         "| 0.01",
         "| 0.1",
     ]
+
+
+def test_exact_directions_come_last_in_their_sweep_and_the_true_stretch_shows(tmp_path):
+    stretches = {"exact": 1.01, 8: 1.016, 2: 1.25, 4: 1.04}
+    swept = [
+        row("good", directions=m, scenario_parameters=json.dumps({"directions": m}))
+        | {"max_principal_stretch": stretch, "needs": "gravity", "variables": 9, "nonzeros": 9}
+        for m, stretch in stretches.items()
+    ]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, swept)
+    runs = load_runs(tmp_path)
+    assert list(sweeps(runs)) == ["directions"]
+    assert sweeps(runs)["directions"]["shown"].tolist() == ["2", "4", "8", "exact"]
+    assert beyond(sweeps(runs)["directions"]).tolist() == pytest.approx([0.24, 0.03, 0.006, 0])
+    write_report(tmp_path)
+    lines = (tmp_path / "sweeps.md").read_text().splitlines()[-4:]
+    assert [line.split(" | ")[0] for line in lines] == ["| 2", "| 4", "| 8", "| exact"]
+    assert [line.split(" | ")[-1] for line in lines] == ["0.24 |", "0.03 |", "0.006 |", "0 |"]
+    drawn = "".join(ElementTree.parse(tmp_path / "sweep-directions.svg").getroot().itertext())
+    assert "exact" in drawn
+    assert set(ledger(runs)["directions"]) == {"2", "4", "8", "exact"}
 
 
 def test_scenes_with_other_settings_have_tables_of_their_own(tmp_path):

@@ -9,8 +9,9 @@ import pandas as pd
 from strainbench.records import RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_markdown
+from strainbench.report.failures import failures, failures_markdown
 from strainbench.report.page import write_page
-from strainbench.report.sweep import draw_sweeps, sweep_markdown
+from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_markdown
 from strainbench.report.table import as_latex, as_markdown, describe, tidy
 
 WORDS = {
@@ -18,6 +19,7 @@ WORDS = {
         "cell",
         "finished_at",
         "scenario",
+        "directions",  # a number, or exact
         "integrator",
         "solver",
         "mode",
@@ -60,7 +62,12 @@ def write_report(folder: Path) -> list[Path]:
     paths["table1.md"].write_text(markdown)
     if swept := sweep_markdown(runs):
         paths["sweeps.md"] = folder / "sweeps.md"
-        paths["sweeps.md"].write_text("# Sweeps\n\n" + "\n\n".join(swept) + "\n")
+        paths["sweeps.md"].write_text(f"# Sweeps\n\n{BEYOND}\n\n" + "\n\n".join(swept) + "\n")
+    failed = failures(folder, runs)
+    if len(failed):
+        paths |= {n: folder / n for n in ("failures.csv", "failures.md")}
+        failed.to_csv(paths["failures.csv"], index=False)
+        paths["failures.md"].write_text(failures_markdown(failed, runs, machines))
     if table := energy_markdown(folder, runs):
         paths["energy.md"] = folder / "energy.md"
         paths["energy.md"].write_text(table)

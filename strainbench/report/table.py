@@ -132,11 +132,12 @@ def tidy(runs: pd.DataFrame) -> pd.DataFrame:
 def explanation(runs: pd.DataFrame) -> str:
     """What the signs of a table mean."""
     thresholds = runs.iloc[0]
+    errors = runs["reference_error_max"].replace(np.inf, np.nan)  # of infeasible frames
     local = runs["max_violation"].notna() & runs["relative_gap_max"].isna()
     return EXPLANATION.format(
         violation=thresholds["violation_threshold"],
         gap=thresholds["gap_threshold"],
-        error=1000 * np.nan_to_num(runs["reference_error_max"].max()),
+        error=1000 * np.nan_to_num(errors.max()),
     ) + (LOCAL if local.any() else "")
 
 

@@ -1,0 +1,174 @@
+"""Where methods fail: hard cases, each beside its easier neighbour.
+
+A scene that is hard names its easier neighbour (`Scenario.easier`). A method that fails on the one
+and does better on the other fails by itself; one that does no better may be ours to mend.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from strainbench.discovery import find_scenario
+from strainbench.records import STEP_COLUMNS, STEPS, read_rows
+from strainbench.referee import OUTCOMES
+from strainbench.report.table import UNCONSTRAINED, machine_line, power
+
+EXPLANATION = """\
+Signs: ✓ optimal on every step (violation at most {violation}, relative gap at most {gap}), or an
+infeasible case called infeasible; ○ within the limits but not optimal (relative gap, distance of
+the farthest vertex), or an infeasible case on which the method gave up without a claim; ✗ limits
+violated (by how much, and what the method itself says), an infeasible case called solved, or no
+usable answer. What is shown is the worst step.
+
+Each failure is checked on an easier neighbour of its case. Where the method does better there, and
+within the limits, the failure is the method's. †: it does not, by its nature or by a fault of
+ours."""
+RUN = ("scenario", "mode", "steps_asked", "tolerance")
+PASSED, PARTLY, FAILED = "✓", "○", "✗"
+COLUMNS = ("case", "method", "sign", "found", "neighbour", "verdict", "reason")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hard scene: how it is called, its neighbour's parameters, what sets the neighbour apart."""
+
+    title: str
+    neighbour: str
+    apart: str
+
+
+def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
+    """A line for each method on each hard case of a results folder; see COLUMNS."""
+    says, cases = _statuses(folder), _cases(runs)
+    keys = ["scenario_parameters", "solver", *RUN]
+    by_key = {tuple(row[keys]): row for _, row in runs.iterrows()}
+    lines = []
+    for (parameters, *how), rows in runs.groupby(["scenario_parameters", *RUN], sort=False):
+        case = cases.get(str(parameters))
+        if case is None:
+            continue
+        alike = runs[runs["scenario_parameters"] == parameters]
+        title = ", ".join(
+            [
+                case.title,
+                *(_setting(k, v) for k, v in zip(RUN, how, strict=True) if alike[k].nunique() > 1),
+            ]
+        )
+        infeasible = rows["reason"].str.contains("projections: infeasible:", regex=False).any()
+        for _, row in rows[rows["solver"] != UNCONSTRAINED].iterrows():
+            if row["reason"].startswith("unavailable"):
+                continue
+            status = says.get((row["cell"], row["outcome"]), "")
+            sign, found = _judge_infeasible(row, status) if infeasible else _judge(row, status)
+            easier = by_key.get((case.neighbour, *row[keys[1:]]))
+            verdict = "" if sign == PASSED else _verdict(row, easier, case.apart)
+            there = "" if easier is None else easier["outcome"]
+            line = (title, row["solver"], sign, found, there, verdict, row["reason"])
+            lines.append(dict(zip(COLUMNS, line, strict=True)))
+    return pd.DataFrame(lines, columns=list(COLUMNS))
+
+
+def _statuses(folder: Path) -> dict[tuple[str, str], str]:
+    """What the solver says of a cell's projections of each outcome."""
+    latest = {(r["cell"], r["projection"]): r for r in read_rows(folder / STEPS, STEP_COLUMNS)}
+    found: dict[tuple[str, str], set[str]] = {}
+    for row in latest.values():
+        found.setdefault((row["cell"], row["outcome"]), set()).add(row["status"])
+    return {key: ", ".join(sorted(statuses)) for key, statuses in found.items()}
+
+
+def _cases(runs: pd.DataFrame) -> dict[str, Case]:
+    """The scenes of a folder that have an easier neighbour, by their parameters."""
+    found = {}
+    for name, rows in runs.groupby("scenario", sort=False):
+        texts = list(dict.fromkeys(rows["scenario_parameters"]))
+        every = [json.loads(text or "{}") for text in texts]
+        vary = [k for k in every[0] if len({json.dumps(e.get(k)) for e in every}) > 1]
+        for text, mine in zip(texts, every, strict=True):
+            easy = _easier(str(name), mine)
+            if easy is not None:
+                apart = [k for k in mine if easy[k] != mine[k]]
+                shown = dict.fromkeys([*vary, *apart])
+                title = ", ".join([str(name), *(_setting(k, mine[k]) for k in shown)])
+                neighbour = json.dumps(easy, sort_keys=True)
+                found[text] = Case(title, neighbour, ", ".join(_setting(k, easy[k]) for k in apart))
+    return found
+
+
+def _easier(name: str, parameters: dict[str, Any]) -> dict[str, object] | None:
+    """The parameters of the easier neighbour; None without one, or for a scene not of ours."""
+    try:
+        neighbour = find_scenario(name)(**parameters).easier()
+    except (ValueError, TypeError):
+        return None
+    return None if neighbour is None else neighbour.parameters
+
+
+def _setting(key: str, value: object) -> str:
+    return f"{key} {value:g}" if isinstance(value, float) else f"{key} {value}"
+
+
+def _judge(row: pd.Series, status: str) -> tuple[str, str]:
+    """Sign and words for a method on a case that can be solved."""
+    if row["outcome"] == "optimal":
+        return PASSED, ""
+    if row["outcome"] == "feasible":
+        distance = f"{1000 * row['distance_max']:.2g} mm"
+        return PARTLY, f"gap {power(row['relative_gap_max'])}, {distance}"
+    if row["outcome"] == "violated":
+        return FAILED, f"violated by {power(row['max_violation'])}, says {status}"
+    return FAILED, f"no answer, says {status}" if status else row["reason"].split(" (")[0]
+
+
+def _judge_infeasible(row: pd.Series, status: str) -> tuple[str, str]:
+    """The same on a case that cannot: the right answer is to say so."""
+    if "infeasible" in status.lower():
+        return PASSED, "says infeasible"
+    if status == "solved":
+        return FAILED, f"says solved, violated by {power(row['max_violation'])}"
+    return (PARTLY, status) if status else _judge(row, status)
+
+
+def _verdict(row: pd.Series, easier: pd.Series | None, apart: str) -> str:
+    """Whose failure it is, as far as the easier neighbour tells."""
+    if row["reason"].startswith("unsupported"):
+        return "refused"
+    if easier is None:
+        return f"not run at {apart}"
+    here, there = (OUTCOMES.index(r["outcome"]) for r in (row, easier))
+    if there < min(here, OUTCOMES.index("violated")):
+        return f"{easier['outcome']} at {apart}: the method's"
+    return f"{easier['outcome']} at {apart} too: by its nature, or a fault of ours"
+
+
+def failures_markdown(
+    table: pd.DataFrame, runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
+) -> str:
+    """Methods against cases, what the signs mean, a line for each failure, the machine."""
+    cases, methods = list(dict.fromkeys(table["case"])), list(dict.fromkeys(table["method"]))
+    cells = {(r["case"], r["method"]): _cell(r) for _, r in table.iterrows()}
+    lines = [["method", *cases], ["---"] * (1 + len(cases))]
+    lines += [[m, *(cells.get((c, m), "") for c in cases)] for m in methods]
+    first = runs.iloc[0]
+    limits = {"violation": first["violation_threshold"], "gap": first["gap_threshold"]}
+    parts = ["# Where methods fail", EXPLANATION.format(**limits)]
+    parts.append("\n".join("| " + " | ".join(line) + " |" for line in lines))
+    for case, rows in table[table["sign"] != PASSED].groupby("case", sort=False):
+        reasons = [
+            f"- {r['method']}: {r['found']}; {r['verdict']}. In full: {r['reason']}"
+            for _, r in rows.iterrows()
+        ]
+        parts.append(f"## {case}\n\n" + "\n".join(reasons))
+    parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
+    return "\n\n".join(parts) + "\n"
+
+
+def _cell(row: pd.Series) -> str:
+    shared = " †" if " too: " in row["verdict"] else ""
+    return f"{row['sign']} {row['found']}".strip() + shared

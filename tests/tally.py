@@ -1,0 +1,49 @@
+"""What became of the answers to many problems: per solver, and certificates contradicted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+
+from strainbench.referee import OUTCOMES, Certificate
+
+BROKEN = "solved, but violated"
+COLUMNS = (*OUTCOMES, BROKEN, "refused")
+
+
+@dataclass
+class Tally:
+    """Counts of problems, of contradicted certificates, and of each solver's outcomes."""
+
+    problems: int = 0
+    certificates: int = 0
+    contradictions: list[str] = field(default_factory=list)
+    answers: dict[str, Counter[str]] = field(default_factory=dict)
+
+    def refused(self, name: str) -> None:
+        """A problem with limits that the solver does not take."""
+        self.answers.setdefault(name, Counter())["refused"] += 1
+
+    def answer(self, name: str, status: str, found: Certificate) -> None:
+        """An answer, with what the solver says and what the referee finds."""
+        counts = self.answers.setdefault(name, Counter())
+        counts[found.outcome] += 1
+        counts[BROKEN] += status == "solved" and found.outcome == "violated"
+        self.certificates += found.outcome != "no answer"
+
+    def problem(self, contradictions: Sequence[str]) -> None:
+        """A problem is done, with what contradicts its certificates."""
+        self.problems += 1
+        self.contradictions += contradictions
+
+    def lines(self) -> Iterator[str]:
+        """The counts as a table."""
+        found = f"{len(self.contradictions)} of {self.certificates} certificates contradicted"
+        yield f"{self.problems} problems: {found}"
+        yield from self.contradictions
+        width = max(map(len, self.answers), default=0)
+        yield "  ".join([" " * width, *COLUMNS])
+        for name in sorted(self.answers):
+            counts = (f"{self.answers[name][c]:{len(c)}}" for c in COLUMNS)
+            yield "  ".join([name.ljust(width), *counts])
