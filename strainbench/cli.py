@@ -400,7 +400,7 @@ def duel_(
         )
     title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
     outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
-    Console(width=max(console.width, 160)).print(outcome.table())  # its columns are many
+    Console(width=max(console.width, 200)).print(outcome.table())  # its columns are many
     if output is not None:
         write_outcome(outcome, output)
         console.print(f"wrote {output}", highlight=False, markup=False, soft_wrap=True)

@@ -35,6 +35,7 @@ CSV_HEADER = (
     "projections",
     "says",
     "machine",
+    "command",
 )
 
 HEADER = (
@@ -89,6 +90,7 @@ class Outcome:
                 len(entry.seconds),
                 "; ".join(entry.unsolved),
                 next(iter(self.machines)),
+                self.command,
             )
             yield dict(zip(CSV_HEADER, values, strict=True))
 
@@ -138,9 +140,8 @@ class Outcome:
         return "\n\n".join(parts) + "\n"
 
     def csv(self) -> str:
-        """One line an entry, under a comment with the command."""
+        """One line an entry."""
         buffer = io.StringIO()
-        buffer.write(f"# {self.command}\n")
         writer = csv.DictWriter(buffer, CSV_HEADER, lineterminator="\n")
         writer.writeheader()
         writer.writerows(self.rows())
