@@ -6,10 +6,12 @@ BIN    := $(VENV)/bin
 LOCAL  := results/local
 BENCH  ?= $(LOCAL)/bench
 PAPER  ?= $(LOCAL)/paper
-ALL    := --solver all
+FIELD  ?= $(LOCAL)/field
+TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipopt,ipopt-default \
+	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper test check perf report clean
+.PHONY: help setup bench bench-paper field test check perf report clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -17,14 +19,19 @@ help: ## this list
 setup: $(VENV)/.done ## a virtual environment with everything, Ipopt included
 
 bench: setup ## Table 1 in a few minutes: swing at 10 and 20 cells, 1% and 10%, 10 steps
-	$(BIN)/strainbench run swing $(ALL) --set resolution=10,20 --set limit=1%,10% \
+	$(BIN)/strainbench run swing $(TABLE1) --set resolution=10,20 --set limit=1%,10% \
 		--steps 10 --time-limit 30 --results $(BENCH)
 	$(BIN)/strainbench report --results $(BENCH)
 
 bench-paper: setup ## the paper's whole grid, 100 steps; hours, resumable, 10 minutes a cell at most
-	$(BIN)/strainbench run swing $(ALL) --set resolution=10,20,40,60 --set limit=1%,10% \
+	$(BIN)/strainbench run swing $(TABLE1) --set resolution=10,20,40,60 --set limit=1%,10% \
 		--steps 100 --time-limit 600 --results $(PAPER)
 	$(BIN)/strainbench report --results $(PAPER)
+
+field: setup ## every method on the same frames: swing at 20 and 40 cells, 1%; half an hour
+	$(BIN)/strainbench run swing --mode replay --set resolution=20,40 --steps 10 \
+		--time-limit 60 --results $(FIELD)
+	$(BIN)/strainbench report --results $(FIELD)
 
 test: setup ## the tests
 	$(BIN)/python -m pytest -q
@@ -50,7 +57,7 @@ $(VENV)/.done: pyproject.toml Makefile
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
 		sys.exit(0 if v >= (3, 11) else f"strainbench needs Python 3.11 or later; $(PYTHON) is {v[0]}.{v[1]}: make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev]'
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev,pardiso]'
 	@$(MAKE) --no-print-directory ipopt || \
 		echo "Ipopt could not be set up (see above): the ipopt solvers will be unavailable, the rest works."
 	@touch $@

@@ -22,10 +22,10 @@ from strainbench.conic import ConicForm
 class Qoco(Solver):
     """Interior-point second-order cone programming (Tang et al. 2022, Eq. 12; QOCO).
 
-    What `clarabel` solves, see `strainbench.conic`. Called without cvxpy it takes 0.6 to 0.9 of the
-    time, and its last iterate is kept where it ends with a numerical error, which cvxpy takes for
-    no answer: close to a gap of 1e-6 its linear systems get too ill-conditioned to go on. It
-    neither looks at a clock nor detects that limits cannot be met.
+    What `clarabel` solves, see `strainbench.conic`. Called without cvxpy it takes as long or less
+    (0.6 to 1 of the time), and its last iterate is kept where it ends with a numerical error, which
+    cvxpy takes for no answer: close to a gap of 1e-6 its linear systems get too ill-conditioned to
+    go on. It neither looks at a clock nor detects that limits cannot be met.
 
     Parameters
     ----------

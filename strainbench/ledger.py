@@ -187,7 +187,10 @@ class Run:
         if self.added:
             target = self.added.candidate(target)
         problem = self.problem.with_target(target)
-        solution = run_solver(self.solver, problem, self.state, self.tolerance)
+        try:
+            solution = run_solver(self.solver, problem, self.state, self.tolerance)
+        except Exception as error:  # a failing solver is data here too
+            raise NoAnswer(f"{type(error).__name__}: {error}") from error
         if not np.all(np.isfinite(solution.positions)):
             raise NoAnswer(str(solution.status))
         if self.added:

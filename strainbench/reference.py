@@ -1,8 +1,7 @@
 """Reference optima for the referee: solved by one solver of the suite, verified here.
 
-The solver's positions are moved by the last bit of violation that it leaves, or if that fails
-solved for again with tighter bounds, until they are feasible; bound and error are then computed
-from positions and multipliers alone.
+It is given bounds that are tighter by a hair, or by more where that does not suffice, so that its
+positions are feasible; bound and error are then computed from positions and multipliers alone.
 
 A problem with lower bounds is not convex. Its reference is a local optimum found from the target,
 an objective to compare with and nothing more.
@@ -16,23 +15,20 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from strainbench.discovery import UnavailableError, find_solver
 from strainbench.limits import FloatArray
 from strainbench.problem import Problem
 from strainbench.solver import Solver, run_solver
 
-REFERENCE_SOLVER = "clarabel-tight"
+REFERENCE_SOLVER = "newton-ipm"
+SLOW_SOLVER = "clarabel-tight"  # of exact limits in volumes
 LOCAL_SOLVER = "ipopt"  # of problems with lower bounds
-TOLERANCE = 1e-6  # asked of the reference solver, which stalls below
-ATTEMPTS = 4  # each but the first with bounds tightened further, by this and twice the violation
-MARGIN = 1e-8
+TOLERANCE = 1e-11  # asked of the reference solver
+LOCAL_TOLERANCE = 1e-6
+ATTEMPTS = 4  # each but the first with bounds tightened further, by three times the violation
+MARGIN = 3e-13  # of the first attempt, above what the reference solver leaves of violation
 ACTIVE = 1e-6  # constraints this close to their bound count as active
-REPAIRABLE = 1e-5  # violations up to this are repaired
-REGULAR = 1e-8  # of the repair's matrix, relative to its mean diagonal
-REPAIRS = 50  # Newton steps at most, each a pair of triangular solves
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,68 +139,32 @@ class ReferenceSolver:
             self._state = self._solver.prepare(self._problem)
             self._prepared = True
         if not problem.convex:
-            found = run_solver(self._solver, problem, self._state, TOLERANCE)
+            found = run_solver(self._solver, problem, self._state, LOCAL_TOLERANCE)
             return found.positions, np.zeros((problem.rows, 3))
-        margin, best = 0.0, -np.inf
+        margin, best = MARGIN, -np.inf
         for _ in range(ATTEMPTS):
-            tight = problem.tightened(margin)
-            solution = run_solver(self._solver, tight, self._state, TOLERANCE)
-            assert solution.multipliers is not None, f"{REFERENCE_SOLVER} returns no multipliers"
+            solution = run_solver(self._solver, problem.tightened(margin), self._state, TOLERANCE)
+            assert solution.multipliers is not None, f"{self._solver.label}: no multipliers"
             bound = verify(problem, solution.positions, solution.multipliers).lower_bound
             if bound > best:
                 best, multipliers = bound, solution.multipliers
             violation = float(problem.violations(solution.positions).max())
-            positions = repaired(problem, solution.positions)
-            if not problem.violations(positions).max() > 0:  # NaN where limits cannot be met
+            if violation == 0 or not (margin or violation > 0):
                 break
-            margin += MARGIN + 2 * violation
-        return positions, multipliers
+            # limits that can be met, but not tightened ones, leave it no answer
+            margin = 0.0 if np.isnan(violation) else margin + 3 * violation
+        return solution.positions, multipliers
 
 
 def _reference_solver(problem: Problem) -> Solver | None:
     """The solver of references; None where only a missing one could take lower bounds."""
     if problem.convex:
-        return find_solver(REFERENCE_SOLVER)
+        fast = find_solver(REFERENCE_SOLVER)
+        return find_solver(SLOW_SOLVER) if fast.supports(problem) else fast
     try:
         return find_solver(LOCAL_SOLVER)
     except UnavailableError:
         return None
-
-
-def repaired(problem: Problem, positions: FloatArray) -> FloatArray:
-    """Nearly feasible positions (n, 3) moved by about their violation, to feasible ones.
-
-    Newton steps on the rows at their bound, with a matrix factorised once: the least move that
-    takes each violated row just inside and leaves the others where they are, up to REGULAR.
-    Where that fails, the positions come back still violated.
-    """
-    stretches = problem.stretches(positions)
-    violation = float(np.max(stretches - problem.bounds))
-    if not 0 < violation < REPAIRABLE:
-        return positions
-    active = np.flatnonzero(stretches > problem.bounds - ACTIVE)
-    along = (problem.G @ positions)[active] / stretches[active, None]
-    J = sp.hstack(
-        [sp.diags_array(a) @ problem.G[active][:, problem.free] for a in along.T], format="csr"
-    )
-    weights = np.tile(problem.weights[problem.free], 3)
-    stiffness = weights.mean() * len(active) / (REGULAR * float(np.sum(J.data**2)))
-    factor = splu(
-        sp.csc_matrix(sp.diags_array(weights) + stiffness * (J.T @ J)),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
-    x = positions.copy()
-    for _ in range(REPAIRS):
-        excess = (problem.stretches(x) - problem.bounds)[active]
-        if excess.max() > REPAIRABLE:  # the steps diverge
-            return positions
-        wanted = np.where(excess > 0, 1.5 * excess + 1e-14, 0.0)
-        if not np.any(wanted):
-            break
-        x[problem.free] -= stiffness * factor.solve(J.T @ wanted).reshape(3, -1).T
-    return x
 
 
 def reference_of(problem: Problem) -> Reference:
@@ -213,8 +173,8 @@ def reference_of(problem: Problem) -> Reference:
 
 
 def content_key(problem: Problem) -> str:
-    """A digest of everything that the optimum depends on."""
-    digest = hashlib.sha256()
+    """A digest of everything that the optimum depends on, and of who found it."""
+    digest = hashlib.sha256(f"{REFERENCE_SOLVER} {TOLERANCE}".encode())
     for array in (
         problem.row_vertices,
         problem.row_coefficients,

@@ -1,4 +1,7 @@
-"""No certificate is contradicted by any solver's answer, on 50 random irregular problems."""
+"""No certificate is contradicted by any solver's answer, on 50 random irregular problems.
+
+Each problem goes to every third solver, so that each solver has 16 or 17 of them.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ def test_no_answer_contradicts_its_certificate(seed):
     problem = random_problem(np.random.default_rng([2022, seed]))
     reference = reference_of(problem)
     assert reference.infeasible is None
-    for name in NAMES:
+    for name in NAMES[seed % 3 :: 3]:
         solver = find_solver(name)
         if solver.supports(problem):  # it refuses such limits
             continue

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strainbench.ledger import AS_IT_IS, PARTS, ledger, write_ledger
+from strainbench.ledger import AS_IT_IS, PARTS, Run, compared, ledger, write_ledger
 from strainbench.plan import plan
 
 
@@ -120,3 +120,12 @@ def test_a_solver_that_is_not_there_is_one_line(tmp_path, monkeypatch):
     absent = replace(cell, solver=replace(cell.solver, unavailable="needs nothing we have"))
     with pytest.raises(ValueError, match="needs nothing we have"):
         write_ledger([absent], tmp_path)
+
+
+def test_a_solver_that_fails_is_a_note():
+    from tests.misbehaving import Raise
+
+    scene = cells("stretch-square")[0].scenario.scenario()
+    run = Run(scene, Raise(), 1e-6).play(3)
+    assert run.note == "no answer in step 1: ZeroDivisionError: by a solver"
+    assert compared(AS_IT_IS, run, run).distance_mm is None

@@ -65,7 +65,11 @@ class Admm(Solver):
         in place of the optimal ones. "residuals" is the textbook's: all rho_i equal, doubled or
         halved where one residual exceeds the other ten times (Boyd et al. 2011, Eq. 3.13).
     relaxation : alpha.
-    memory : former iterates in Anderson acceleration; 0 is none.
+    memory : former iterates in Anderson acceleration; 0 is none. With 6 it saves a tenth to a half
+        of the iterations on the swing, each of which then takes two to three times as long.
+
+    It reaches gaps of 1e-6 in 300 to 5000 iterations on frames of the swing at 10 to 40 cells, 1%
+    and 0.1%; the violation of x is often the last to fall.
     """
 
     name = "admm"

@@ -39,7 +39,7 @@ class Cvxpy(Solver):
     backend : "CLARABEL", "ECOS", "SCS", "QOCO" or "MOSEK", where installed. SCS, a first-order
         method, needs 1e3 to 2e4 iterations for a gap of 1e-6 at 10 cells, whatever its scale,
         relaxation or acceleration, and reaches its limit of 1e5 on some problems. QOCO's iterate
-        is lost where it ends with a numerical error, about one frame in six.
+        is lost where it ends with a numerical error.
     settings : "tuned" as above, or "default": s M = 1 kg and metres as they are, and the
         backend's own tolerances.
     """
@@ -69,7 +69,7 @@ class Cvxpy(Solver):
         """A reason, where the backend is missing or has no semidefinite cones."""
         if problem.limits.spectral and self.backend not in SEMIDEFINITE:
             return f"{self.backend} has no semidefinite cones, which exact limits need"
-        return self.missing()
+        return super().supports(problem) or self.missing()
 
     def prepare(self, problem: Problem) -> Model | None:
         """The compiled model; None where all vertices are pinned."""

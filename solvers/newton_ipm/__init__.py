@@ -67,10 +67,10 @@ LOW, HIGH = 0.1, 5.0  # products aimed at by correctors, in sigma mu
 BACK_OFF = 0.99
 SNAPSHOT = 0.1  # relative gap
 PATIENCE = 25  # iterations after which a warm start is given up
+STRICTER = 100.0  # limits must hold so much better than the gap: they do, but for the last steps
 ROUNDING = 32 * np.finfo(float).eps  # of a sum of products, as the referee counts it
-WIDER = (
-    0.02  # of the tolerance; tuned on pins with nothing to spare: 1e-3 stalls, 0.5 adds to the gap
-)
+WIDER = 0.02  # of the tolerance; tuned on pins with nothing to spare: 1e-3 stalls, 0.5 adds a gap
+FAR = 1e-7  # errors below are rounding's: no other way out is tried
 STALL, JAM = 12, 30  # iterations without progress, below an error of 1e-3 and above
 ROUGH, ROUGH_ITERATIONS = 0.1, 40  # of projections onto wider limits
 
@@ -101,6 +101,12 @@ no factor any more; the best iterate is returned |
     warm: bool = False
     max_iterations: int = 200
 
+    def supports(self, problem: Problem) -> str | None:
+        """A reason, where limits are exact and elements are not triangles."""
+        if problem.limits.spectral and problem.elements.shape[1] != 3:
+            return "its exact limits are those of triangles"
+        return super().supports(problem)
+
     def prepare(self, problem: Problem) -> State | None:
         """Sparsity, ordering and symbolic factorisation; None where there is nothing to move."""
         return State(problem) if len(problem.free) else None
@@ -122,12 +128,12 @@ no factor any more; the best iterate is returned |
             return Solution(problem.target.copy(), "solved", 0, np.zeros((problem.rows, 3)))
         if state is None or problem.infeasible_pins():
             return Solution(nowhere, "infeasible", 0)
-        found = self._attempt(problem, state, self.warm, tolerance, monitor, deadline)
-        if found.status != "stalled":
+        found, error = self._attempt(problem, state, self.warm, tolerance, monitor, deadline)
+        if found.status != "stalled" or error < FAR:
             return found
         wider = problem.tightened(-WIDER * tolerance)  # 7
         rest = (1 - WIDER) * tolerance
-        other = self._attempt(wider, state, False, rest, monitor, deadline)
+        other, _ = self._attempt(wider, state, False, rest, monitor, deadline)
         if other.status == "solved":
             return replace(other, iterations=found.iterations + other.iterations)
         violation = float(problem.violations(found.positions).max())
@@ -143,8 +149,8 @@ no factor any more; the best iterate is returned |
         tolerance: float,
         monitor: Callable[..., None],
         deadline: Clock,
-    ) -> Solution:
-        """Steps 2 to 6."""
+    ) -> tuple[Solution, float]:
+        """Steps 2 to 6; and the least error, which is the solution's."""
         iterate = Iterate(problem, state, keep=warm)
         warm = warm and state.snapshot is not None
         if warm:
@@ -160,10 +166,10 @@ no factor any more; the best iterate is returned |
             if error < best:
                 best, best_at, kept = error, k, (iterate.x, iterate.Y)
             if error <= tolerance:  # 2
-                return Solution(iterate.x, "solved", k, iterate.Y)
+                return Solution(iterate.x, "solved", k, iterate.Y), error
             if iterate.infeasible:
                 nowhere = np.full_like(iterate.x, np.nan)
-                return Solution(nowhere, "infeasible", k, iterate.Y)
+                return Solution(nowhere, "infeasible", k, iterate.Y), error
             if deadline.passed:
                 status = "time limit"
                 break
@@ -180,7 +186,7 @@ no factor any more; the best iterate is returned |
                 status = "stalled"
                 break
         x, Y = (iterate.x, iterate.Y) if kept is None else kept
-        return Solution(x, status, k, Y)
+        return Solution(x, status, k, Y), float(best)
 
 
 def roughly(
@@ -270,7 +276,7 @@ class Iterate:
         priced = objective - bound + float(norms @ np.maximum(excess, 0.0))
         self.gap = max(0.0, priced) / max(bound, self.floor)
         self.violation = float(np.max(excess))
-        return max(self.violation, self.gap)
+        return max(STRICTER * self.violation, self.gap)
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""

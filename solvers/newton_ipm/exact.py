@@ -12,6 +12,8 @@ with A_ki = sym((R^-1 Y_i)(R^-1 B_k)^T). Symmetric matrices are stored as their 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numba import njit
 
@@ -21,6 +23,7 @@ from strainbench import Problem
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import Pattern
 
+ROOT_HALF = 0.5**0.5
 OFF = np.array([1.0, 1.0, 2.0])  # an off-diagonal entry counts twice in an inner product
 
 
@@ -108,14 +111,8 @@ class ExactCones:
 
     def push(self, c: FloatArray, r: FloatArray) -> FloatArray:
         """(n, 3) G^T (H Y), for scaled products that are to change by c."""
-        mean = np.stack([*self._d.T, self._d.mean(axis=1)], axis=1)
-        self._r = congruent(self._inverse, r)
-        self._h = c / mean - self._r
-        H = congruent(self._inverse.swapaxes(1, 2), self._h)
-        a, d, b = (H[:, i, None] for i in range(3))
-        Y = np.empty_like(self.y)
-        Y[::2] = a * self.y[::2] + b * self.y[1::2]
-        Y[1::2] = b * self.y[::2] + d * self.y[1::2]
+        self._r, self._h, Y = np.empty_like(r), np.empty_like(r), np.empty_like(self.y)
+        fill_push(self._inverse, self._d, c, r, self.y, self._r, self._h, Y)
         return self.back(Y)
 
     def change(self, dx: FloatArray) -> Change:
@@ -154,11 +151,10 @@ class ExactCones:
     def centrality(
         self, c: FloatArray, change: Change, a: float, low: float, high: float
     ) -> FloatArray:
-        """c with what moves the diagonal products after the part a of a step into [low, high]."""
-        after = symmetric_product(*self._after(change, a))[:, :2]
-        more = c.copy()
-        more[:, :2] += np.maximum(np.clip(after, low, high) - after, -high)
-        return more
+        """c with what moves the products after the part a of a step into [low, high]."""
+        after = symmetric_product(*self._after(change, a))
+        wanted = mapped(after, lambda p: p + np.maximum(np.clip(p, low, high) - p, -high))
+        return c + wanted - after
 
     def moved(self, change: Change, a: float) -> tuple[FloatArray, FloatArray]:
         """Slacks and multipliers after the part a of a step."""
@@ -174,17 +170,22 @@ def eigenvalues(A: FloatArray) -> tuple[FloatArray, FloatArray]:
     return mean - apart, mean + apart
 
 
+def mapped(A: FloatArray, function: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Symmetric matrices (e, 3) with a function's values for eigenvalues.
+
+    It is linear in A and I: the line through the values at both eigenvalues.
+    """
+    low, high = eigenvalues(A)
+    at_low, at_high = function(low), function(high)
+    slope = (at_high - at_low) / np.where(high > low, high - low, 1.0)
+    out: FloatArray = slope[:, None] * A
+    out[:, :2] += (at_high - slope * high)[:, None]
+    return out
+
+
 def widened(A: FloatArray, B: FloatArray) -> FloatArray:
     """A + (B - A)_+, above both A and B: the larger one where they are numbers."""
-    D = B - A
-    low, high = eigenvalues(D)
-    spread = np.where(high > low, high - low, 1.0)
-    up, down = np.maximum(high, 0.0), np.maximum(low, 0.0)
-    # D_+ is linear in D and I, such that the eigenvalues low and high become down and up
-    slope = np.where(high > low, (up - down) / spread, 0.0)
-    wide: FloatArray = A + slope[:, None] * D
-    wide[:, :2] += (up - slope * high)[:, None]
-    return wide
+    return A + mapped(B - A, lambda d: np.maximum(d, 0.0))
 
 
 def congruent(R: FloatArray, A: FloatArray) -> FloatArray:
@@ -210,6 +211,24 @@ def fill_congruent(R, A, out):  # type: ignore[no-untyped-def]
         out[e, 0] = p * p * a + 2 * p * q * b + q * q * d
         out[e, 1] = r * r * a + 2 * r * s * b + s * s * d
         out[e, 2] = p * r * a + (p * s + q * r) * b + q * s * d
+
+
+@njit(cache=True)
+def fill_push(inverse, d, c, r, y, scaled, h, Y):  # type: ignore[no-untyped-def]
+    """scaled = R^-1 r R^-T, h = c/((d_p + d_q)/2) - scaled, and Y = R^-T h R^-1 y."""
+    fill_congruent(inverse, r, scaled)
+    for e in range(len(h)):
+        h0 = c[e, 0] / d[e, 0] - scaled[e, 0]
+        h1 = c[e, 1] / d[e, 1] - scaled[e, 1]
+        h2 = 2 * c[e, 2] / (d[e, 0] + d[e, 1]) - scaled[e, 2]
+        h[e, 0], h[e, 1], h[e, 2] = h0, h1, h2
+        p, q, s, t = inverse[e, 0, 0], inverse[e, 0, 1], inverse[e, 1, 0], inverse[e, 1, 1]
+        H0 = p * p * h0 + 2 * p * s * h2 + s * s * h1
+        H1 = q * q * h0 + 2 * q * t * h2 + t * t * h1
+        H2 = p * q * h0 + (p * t + q * s) * h2 + s * t * h1
+        for i in range(3):
+            Y[2 * e, i] = H0 * y[2 * e, i] + H2 * y[2 * e + 1, i]
+            Y[2 * e + 1, i] = H2 * y[2 * e, i] + H1 * y[2 * e + 1, i]
 
 
 @njit(cache=True)
@@ -240,16 +259,15 @@ def add_hessian(elements, gradients, corners, axes, s, l, y, R, inverse, d, slot
                 p1 = V[1, 0] * y[2 * e, i] + V[1, 1] * y[2 * e + 1, i]
                 A[c, i, 0] = p0 * V[0, c]
                 A[c, i, 1] = p1 * V[1, c]
-                A[c, i, 2] = (p0 * V[1, c] + p1 * V[0, c]) / np.sqrt(2.0)
+                A[c, i, 2] = (p0 * V[1, c] + p1 * V[0, c]) * ROOT_HALF
         for c in range(2):
-            for f in range(2):
+            for f in range(c + 1):
                 for i in range(3):
                     for j in range(3):
-                        h = 0.0
-                        for k in range(3):
-                            h += A[c, i, k] * A[f, j, k]
-                        H[c, f, i, j] = h
+                        h = A[c, i, 0] * A[f, j, 0] + A[c, i, 1] * A[f, j, 1]
+                        H[c, f, i, j] = h + A[c, i, 2] * A[f, j, 2]
                     H[c, f, i, i] += l[e, c] if c == f else l[e, 2]
+        H[0, 1] = H[1, 0].T
         spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data)
 
 
@@ -270,8 +288,12 @@ def scale(s, l, R, inverse, d):  # type: ignore[no-untyped-def] # noqa: E741
     p = c00 * c00 * l[0] + 2 * c00 * c10 * l[2] + c10 * c10 * l[1]
     q = c11 * c11 * l[1]
     r = c11 * (c00 * l[2] + c10 * l[1])
-    angle = 0.5 * np.arctan2(2 * r, p - q)
-    cos, sin = np.cos(angle), np.sin(angle)
+    apart = 0.5 * (p - q)  # the rotation by half the angle of (apart, r)
+    half = abs(apart) + np.hypot(apart, r)
+    cos = half / np.hypot(half, r) if half > 0 else 1.0
+    sin = r / np.hypot(half, r) if half > 0 else 0.0
+    if apart < 0:
+        cos, sin = sin, cos
     R[0, 0], R[0, 1] = c00 * cos, -c00 * sin
     R[1, 0], R[1, 1] = c10 * cos + c11 * sin, -c10 * sin + c11 * cos
     determinant = c00 * c11

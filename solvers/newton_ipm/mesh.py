@@ -67,9 +67,49 @@ def spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data)
             if first < 0:
                 continue
             for j in range(3):
-                column = first + j * width
+                k0 = k1 = k2 = 0.0
                 for c in range(len(axes)):
                     for f in range(len(axes)):
                         weight = gradients[e, a, c] * gradients[e, b, f]
-                        for i in range(3):
-                            data[column + i] += weight * H[c, f, i, j]
+                        k0 += weight * H[c, f, 0, j]
+                        k1 += weight * H[c, f, 1, j]
+                        k2 += weight * H[c, f, 2, j]
+                column = first + j * width
+                data[column] += k0
+                data[column + 1] += k1
+                data[column + 2] += k2
+
+
+@njit(cache=True)
+def spread_symmetric(elements, gradients, corners, axes, e, H, slots, stride, data):  # type: ignore[no-untyped-def]
+    """The same for H_cf = H_fc = H_cf^T, whose entries 00, 01, 02, 11, 12, 22 are H (dim, dim, 6).
+
+    Those with f <= c are read.
+    """
+    for b in range(len(corners)):
+        width = stride[elements[e, b]]
+        for a in range(len(corners)):
+            first = slots[e, a, b]
+            if first < 0:
+                continue
+            k0 = k1 = k2 = k3 = k4 = k5 = 0.0
+            for c in range(len(axes)):
+                for f in range(c + 1):
+                    weight = gradients[e, a, c] * gradients[e, b, f]
+                    if f < c:
+                        weight += gradients[e, a, f] * gradients[e, b, c]
+                    k0 += weight * H[c, f, 0]
+                    k1 += weight * H[c, f, 1]
+                    k2 += weight * H[c, f, 2]
+                    k3 += weight * H[c, f, 3]
+                    k4 += weight * H[c, f, 4]
+                    k5 += weight * H[c, f, 5]
+            data[first] += k0
+            data[first + 1] += k1
+            data[first + 2] += k2
+            data[first + width] += k1
+            data[first + width + 1] += k3
+            data[first + width + 2] += k4
+            data[first + 2 * width] += k2
+            data[first + 2 * width + 1] += k4
+            data[first + 2 * width + 2] += k5

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from solvers.newton_ipm.mesh import Change, gather, spread, spread_blocks
+from solvers.newton_ipm.mesh import Change, gather, spread, spread_symmetric
 from strainbench import Problem
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import Pattern
 
-ROUNDING = 1e-12
+ROUNDING = 1e-14
 """Residuals below it count as 0: divided by small slacks, rounding would floor the gap."""
 
 
@@ -89,8 +89,9 @@ class SampledCones:
 
     def push(self, c: FloatArray, r: FloatArray) -> FloatArray:
         """(n, 3) G^T (h y), for products that are to change by c."""
-        self._r, self._h = r, (c - self.l * r) / self.s
-        return self.back(self._h[:, None] * self.y)
+        self._r, self._h, out = r, np.empty(self.degree), np.zeros((self._n, 3))
+        add_push(*self._mesh, self._d, c, r, self.s, self.l, self.y, self._h, out)
+        return out
 
     def change(self, dx: FloatArray) -> Change:
         """The rest of the step, after `push` and the linear solve."""
@@ -157,28 +158,45 @@ def add_back(elements, gradients, corners, axes, d, Y, out):  # type: ignore[no-
 
 
 @njit(cache=True)
+def add_push(elements, gradients, corners, axes, d, c, r, s, l, y, h, out):  # type: ignore[no-untyped-def] # noqa: E741
+    """h = (c - l r)/s, and G^T (h y) added to `out` (n, 3)."""
+    m = len(d)
+    P = np.empty((len(axes), 3))
+    for e in range(len(elements)):
+        P[:] = 0.0
+        for j in range(m):
+            k = e * m + j
+            h[k] = (c[k] - l[k] * r[k]) / s[k]
+            for a in range(len(axes)):
+                weight = d[j, a] * h[k]
+                for i in range(3):
+                    P[a, i] += weight * y[k, i]
+        spread(elements, gradients, corners, axes, e, P, out)
+
+
+@njit(cache=True)
 def add_hessian(elements, gradients, corners, axes, d, l, z, y, slots, stride, data):  # type: ignore[no-untyped-def] # noqa: E741
     """Add sum_i l_i g g^T (x) I + z_i (g (x) y)(g (x) y)^T, by element and material axes."""
     m = len(d)
-    H = np.empty((len(axes), len(axes), 3, 3))
+    H = np.empty((len(axes), len(axes), 6))
     for e in range(len(elements)):
         H[:] = 0.0
         for j in range(m):
             r = e * m + j
+            y0, y1, y2 = y[r, 0], y[r, 1], y[r, 2]
+            z0, z1, z2 = z[r] * y0, z[r] * y1, z[r] * y2
+            h0, h3, h5 = l[r] + z0 * y0, l[r] + z1 * y1, l[r] + z2 * y2
+            h1, h2, h4 = z0 * y1, z0 * y2, z1 * y2
             for c in range(len(axes)):
                 for f in range(c + 1):
                     weight = d[j, c] * d[j, f]
-                    for i in range(3):
-                        H[c, f, i, i] += weight * l[r]
-                        for k in range(i + 1):
-                            H[c, f, i, k] += weight * z[r] * y[r, i] * y[r, k]
-        for c in range(len(axes)):  # symmetric in coordinates and in axes
-            for f in range(c + 1):
-                for i in range(3):
-                    for k in range(i):
-                        H[c, f, k, i] = H[c, f, i, k]
-                H[f, c] = H[c, f]
-        spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data)
+                    H[c, f, 0] += weight * h0
+                    H[c, f, 1] += weight * h1
+                    H[c, f, 2] += weight * h2
+                    H[c, f, 3] += weight * h3
+                    H[c, f, 4] += weight * h4
+                    H[c, f, 5] += weight * h5
+        spread_symmetric(elements, gradients, corners, axes, e, H, slots, stride, data)
 
 
 @njit(cache=True)
