@@ -127,7 +127,7 @@ no factor any more; the best iterate is returned |
                 state.snapshot = None
             return Solution(problem.target.copy(), "solved", 0, np.zeros((problem.rows, 3)))
         if state is None or problem.infeasible_pins():
-            return Solution(nowhere, "infeasible", 0)
+            return Solution(nowhere, "infeasible", 0, np.zeros((problem.rows, 3)))
         found, error = self._attempt(problem, state, self.warm, tolerance, monitor, deadline)
         if found.status != "stalled" or error < FAR:
             return found
