@@ -1,9 +1,11 @@
-"""The command line: list, run, report, compare, converge, export, ledger, render, polar."""
+"""The command line: list, run, report, compare, converge, duel, export, ledger, render, polar."""
 
 from __future__ import annotations
 
+import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -25,7 +27,8 @@ from strainbench import __version__
 from strainbench.cell import Cell
 from strainbench.discovery import Entry, list_scenarios, list_solvers
 from strainbench.export import check_format, write_problem
-from strainbench.frame import record, recorder
+from strainbench.frame import record, record_all, recorded, recorder
+from strainbench.machine import describe_machine, fixed_threads
 from strainbench.plan import never_warm, plan, plan_one, plan_scene
 from strainbench.problem import Problem
 from strainbench.records import RecordsError
@@ -43,6 +46,7 @@ DEFAULT_RESULTS = Path("results/local/run")
 DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
 DEFAULT_CONVERGENCE = Path("results/local/convergence")
+DEFAULT_DUEL = Path("results/local/duel")
 DEFAULT_STEPS = 10
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -330,9 +334,84 @@ def converge_(
 
 def _record(cell: Cell, frame: int) -> Problem:
     """A projection of a scene, with a progress bar on the way there."""
+    with _playing(cell, frame) as progress:
+        return record(cell, frame, progress)
+
+
+@contextmanager
+def _playing(cell: Cell, frame: int) -> Iterator[Callable[[int], None]]:
+    """What shows how many projections a scene has asked for, on its way to `frame`."""
     with _bar() as bar:
         task = bar.add_task(f"playing {cell.title}", total=max(frame - 1, 1))
-        return record(cell, frame, lambda asked: bar.update(task, completed=asked - 1))
+        yield lambda asked: bar.update(task, completed=asked - 1)
+
+
+@app.command("duel")
+def duel_(
+    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    frame: Annotated[
+        str, typer.Option(help="projections, the first being 1: 5,10 apart, 14-29 in sequence")
+    ],
+    solver: Annotated[
+        list[str], typer.Option(help="name, comma-separated names, path of a .py file")
+    ],
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
+    ] = None,
+    repeats: Annotated[int, typer.Option(help="turns of each solver on each frame")] = 5,
+    tolerance: Annotated[float, typer.Option(help="aimed at by every solver")] = 1e-6,
+    time_limit: Annotated[float, typer.Option(help="seconds a projection")] = 60.0,
+    units: Annotated[
+        bool,
+        typer.Option("--units", help="beside factorisation + solve, and a step of implicit Euler"),
+    ] = False,
+    results: Annotated[Path, typer.Option(help="folder that keeps the frames")] = DEFAULT_DUEL,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="a .csv or .md file to write too")
+    ] = None,
+) -> None:
+    """Let solvers take turns on the same projections: ratios of times in one run."""
+    from strainbench.duel import duel, parse_frames
+    from strainbench.report.duel import Outcome, check_ending, write_outcome
+
+    sequences = parse_frames(frame)
+    last = max(numbers[-1] for numbers in sequences)
+    if repeats < 1:
+        raise ValueError(f"--repeats {repeats}: a whole number above 0 is valid")
+    if output is not None:
+        check_ending(output)
+    cells = plan_scene(scenario, solver, set_ or [], 1, tolerance, time_limit)
+    solvers = [cell.solver.solver() for cell in cells if not cell.solver.unavailable]
+    for cell in cells:
+        if cell.solver.unavailable:
+            raise ValueError(cell.solver.unavailable)
+    machine, about = describe_machine(threads=1)
+    fed = recorder(cells[0])
+    with fixed_threads(1), _playing(fed, last) as progress:
+        if units:  # whose steps are to be timed now
+            recording = record_all(fed, last, progress)
+        else:
+            recording = recorded(fed, last, results / "frames", progress)
+    turns = repeats * sum(map(len, sequences)) * len(solvers)
+    with _bar() as bar:
+        task = bar.add_task("projections", total=turns)
+        entries = duel(
+            solvers,
+            recording,
+            sequences,
+            repeats,
+            tolerance,
+            time_limit,
+            units,
+            lambda: bar.advance(task),
+        )
+    title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
+    outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
+    Console(width=max(console.width, 200)).print(outcome.table())  # its columns are many
+    if output is not None:
+        write_outcome(outcome, output)
+        console.print(f"wrote {output}", highlight=False, markup=False, soft_wrap=True)
 
 
 @app.command()

@@ -1,9 +1,10 @@
-"""One projection of a scene: the K-th that it asks for, everything before it solved."""
+"""Projections of a scene: the first K that it asks for, those before the last solved."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -25,12 +26,41 @@ class _Reached(Exception):  # noqa: N818
     """Ends a scene at the projection that was asked for."""
 
 
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What a scene asks of its projection, from the first on.
+
+    Parameters
+    ----------
+    problem : the scene's mesh, limits and pins
+    targets : (k, n, 3) candidates [m]
+    step_seconds : (steps,) in implicit Euler, of each step ended before the last candidate
+    """
+
+    problem: Problem
+    targets: FloatArray
+    step_seconds: FloatArray
+
+    def frame(self, number: int) -> Problem:
+        """The projection of this number, counted from 1."""
+        return self.problem.with_target(self.targets[number - 1])
+
+
 def record(
     cell: Cell,
     number: int,
     progress: Callable[[int], None] = lambda _: None,
 ) -> Problem:
-    """The problem of a scene's projection `number`, counted from 1, which is not solved itself.
+    """The problem of a scene's projection `number` alone; see `record_all`."""
+    return record_all(cell, number, progress).frame(number)
+
+
+def record_all(
+    cell: Cell,
+    number: int,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Recording:
+    """A scene's projections up to `number`, counted from 1, which is not solved itself.
 
     Parameters
     ----------
@@ -50,6 +80,7 @@ def record(
         raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
     state = solver.prepare(problem)
     targets: list[FloatArray] = []
+    seconds: list[float] = []
 
     def project(target: FloatArray) -> FloatArray:
         targets.append(target)
@@ -65,11 +96,28 @@ def record(
         return solution.positions
 
     try:
-        for _ in scenario.play(project):
-            pass
+        for report in scenario.play(project):
+            seconds.append(report.ie_seconds)
     except _Reached:
-        return problem.with_target(targets[-1])
+        return Recording(problem, np.stack(targets), np.array(seconds))
     raise ValueError(
         f"--frame {number}: {scenario.name} asks for {len(targets)} projections, "
         f"so 1 to {len(targets)} are valid"
     )
+
+
+def recorded(
+    cell: Cell,
+    number: int,
+    folder: Path,
+    progress: Callable[[int], None] = lambda _: None,
+) -> Recording:
+    """The same without times, from `folder` where it was kept there before."""
+    file = folder / f"{cell.recording_key}-{number}.npy"
+    if not file.exists():
+        recording = record_all(cell, number, progress)
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part.npy")
+        np.save(part, recording.targets)
+        part.replace(file)
+    return Recording(cell.scenario.scenario().problem(), np.load(file), np.empty(0))

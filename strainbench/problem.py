@@ -328,7 +328,9 @@ class Problem:
         """(constraints,) of (rows, 3): vector norms, or matrix norms with exact limits."""
         if self.limits.spectral:
             blocks = rows.reshape(len(self.elements), -1, 3)
-            norms: FloatArray = np.linalg.norm(blocks, order, axis=(1, 2))
+            finite = np.isfinite(blocks).all(axis=(1, 2))  # numpy raises for others
+            norms: FloatArray = np.full(len(blocks), np.nan)
+            norms[finite] = np.linalg.norm(blocks[finite], order, axis=(1, 2))
         else:
             norms = np.linalg.norm(rows, axis=1)
         return norms

@@ -71,3 +71,22 @@ def test_a_volume_has_exact_limits_too(name):
     found = certify(problem, solve(problem, name).positions)
     assert found.outcome == "optimal", found.reason
     assert found.max_principal_stretch == pytest.approx(1.05, abs=1e-5)
+
+
+def test_positions_that_are_not_finite_have_no_stretch():
+    problem = stretched_square(2)
+    positions = problem.target.copy()
+    positions[0] = np.nan
+    touched = np.any(problem.elements == 0, axis=1)
+    assert np.array_equal(np.isnan(problem.stretches(positions)), touched)
+
+
+def test_the_referee_says_so_where_limits_cannot_be_met():
+    problem = stretched_square(2)
+    apart = problem.rest * [1.02, 1]
+    target = np.column_stack([apart, np.zeros(len(apart))])
+    pins = np.arange(len(apart))[problem.rest[:, 1] == 0][[0, -1]]
+    impossible = Problem(problem.rest, problem.elements, target, problem.limits, pins)
+    found = certify(impossible, target)
+    assert found.outcome == "violated"
+    assert found.reason.startswith("infeasible")

@@ -271,7 +271,7 @@ def add_hessian(elements, gradients, corners, axes, s, l, y, R, inverse, d, slot
         spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data)
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def scale(s, l, R, inverse, d):  # type: ignore[no-untyped-def] # noqa: E741
     """R with R^-1 S R^-T = R^T L R = diag(d), of one element.
 
@@ -303,7 +303,7 @@ def scale(s, l, R, inverse, d):  # type: ignore[no-untyped-def] # noqa: E741
     d[1] = p * sin * sin - 2 * r * cos * sin + q * cos * cos
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fill_change(elements, gradients, corners, axes, dx, y, inverse, d, r, h, ds, dl, square):  # type: ignore[no-untyped-def]
     """dS~ = r~ - t, dL~ = h + t, square = dY dY^T/2; the step's length is returned."""
     F = np.empty((2, 3))
@@ -331,7 +331,7 @@ def fill_change(elements, gradients, corners, axes, dx, y, inverse, d, r, h, ds,
     return length
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def reach(d, change):  # type: ignore[no-untyped-def]
     """The largest a for which diag(d) + a change has no negative eigenvalue."""
     a, b = change[0] / d[0], change[1] / d[1]

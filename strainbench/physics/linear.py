@@ -16,6 +16,7 @@ import ctypes
 import importlib
 import weakref
 from abc import ABC, abstractmethod
+from functools import cache
 from importlib.util import find_spec
 from typing import Any
 
@@ -149,9 +150,7 @@ class Pardiso(LinearSolver):
     _NOT_POSITIVE = -4  # its error code
 
     def __init__(self, pattern: sp.csc_array) -> None:
-        library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
-        self._function = library.pardiso
-        self._function.argtypes = None
+        self._function = _mkl().pardiso
         n = pattern.shape[0]
         columns = np.repeat(np.arange(n), np.diff(pattern.indptr))
         self._below = np.flatnonzero(pattern.indices >= columns)
@@ -190,6 +189,14 @@ class Pardiso(LinearSolver):
     def solve(self, b: FloatArray) -> FloatArray:
         """See the base class."""
         return self._call(self._SOLVE, b)
+
+
+@cache
+def _mkl() -> Any:
+    """MKL, found once: pypardiso searches the whole environment for it."""
+    library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
+    library.pardiso.argtypes = None
+    return library
 
 
 def _pardiso(
