@@ -67,12 +67,12 @@ def available(name):
         pytest.skip(str(error))
 
 
-def answer(problem, name):
+def answer(problem, name, **options):
     """The solver's solution; the test is skipped, with the reason, where it refuses the limits."""
     solver = available(name)
     if reason := solver.supports(problem):
         pytest.skip(f"{name}: {reason}")
-    return solve(problem, solver)
+    return solve(problem, solver, **options)
 
 
 def stretched_triangle(limit=1.1, mass=None):
@@ -185,7 +185,7 @@ def test_iterates_are_shown_with_the_iterations_that_they_took(name):
         assert np.shape(positions) == problem.target.shape
         shown.append((iterations, seconds))
 
-    solution = solve(problem, available(name), watch=watch)
+    solution = answer(problem, name, watch=watch)
     counts, seconds = zip(*shown, strict=True) if shown else ((), ())
     assert list(counts) == sorted(set(counts))
     assert list(seconds) == sorted(seconds)
