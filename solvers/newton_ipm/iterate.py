@@ -1,0 +1,144 @@
+"""One projection on its way: steps 1 to 6 of `solvers.newton_ipm`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from solvers.newton_ipm.exact import ExactCones
+from solvers.newton_ipm.mesh import Change
+from solvers.newton_ipm.sampled import SampledCones
+from strainbench import Problem
+from strainbench.limits import FloatArray
+from strainbench.physics.linear import best_linear_solver
+from strainbench.physics.pattern import Pattern
+from strainbench.reference import objective_floor
+
+FLOOR = 3e-3  # least first slack, in b^2
+FIRST_MU = 50.0  # times the guess of the optimum's objective
+EXPONENT = 6  # of sigma
+LEAST_SIGMA = 1e-4
+CORRECTORS = 2
+LONGER, GROWTH = 0.3, 0.1  # a corrector aims at this longer a step, and must bring this part of it
+LOW, HIGH = 0.1, 5.0  # products aimed at by correctors, in sigma mu
+BACK_OFF = 0.99
+SNAPSHOT = 0.1  # relative gap
+STRICTER = 100.0  # limits must hold so much better than the gap: they do, but for the last steps
+ROUNDING = 32 * np.finfo(float).eps  # of a sum of products, as the referee counts it
+
+
+class State:
+    """What a mesh needs once, and the last frame's centred iterate."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.pattern = Pattern.of([problem.elements], problem.vertices, problem.pinned)
+        self.linear = best_linear_solver(self.pattern.matrix())
+        kind = ExactCones if problem.limits.spectral else SampledCones
+        self.cones: SampledCones | ExactCones = kind(problem, self.pattern)
+        self.snapshot: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
+        self.cold_iterations = 0
+        _ = problem.largest_objective  # its shortest paths are kept with the problem
+
+    def compare(self, iterations: int, resumed: bool) -> None:
+        """Drop the snapshot of a frame whose own warm start was no better than a cold one."""
+        if not resumed:
+            self.cold_iterations = iterations
+        elif iterations >= self.cold_iterations:
+            self.snapshot = None
+
+
+class Iterate:
+    """Positions, slacks and multipliers of one projection.
+
+    Attributes
+    ----------
+    x : (n, 3) [m]
+    Y : (rows, 3) multipliers
+    infeasible : whether the dual bound shows that no positions meet the limits
+    """
+
+    def __init__(self, problem: Problem, state: State, keep: bool) -> None:
+        self.problem, self.state, self.cones = problem, state, state.cones
+        self.keep = keep
+        self.target, self.weights = problem.target, problem.weights[:, None]
+        self.free, self.floor = problem.free, objective_floor(problem)
+        self.infeasible = False
+        self.x = problem.target
+        self.cones.place(problem.bounds, self.x)
+        self.y_target, self.violations = self.cones.y, np.maximum(self.cones.excess(), 0.0)
+
+    def start(self) -> None:
+        """From the target, with products of a guess: the violation over the size of the mesh."""
+        problem = self.problem
+        size = problem.edge_length * np.sqrt(problem.vertices)
+        far = size * np.sqrt(np.mean(self.violations**2))
+        guess = 0.5 * far**2 * float(np.sum(problem.weights[self.free]))
+        self.x = self.target
+        self.cones.place(problem.bounds, self.x)
+        self.cones.start(FLOOR, FIRST_MU * guess / self.cones.degree)
+
+    def resume(self) -> None:
+        """From the snapshot, moved as the target has moved."""
+        assert self.state.snapshot is not None
+        x, s, l, target = self.state.snapshot  # noqa: E741
+        self.x = x + (self.target - target)
+        self.cones.place(self.problem.bounds, self.x)
+        self.cones.resume(s, l)
+
+    def measure(self) -> float:
+        """The larger of violation and relative gap at x, the violations priced in."""
+        cones, free = self.cones, self.free
+        self.Y, norms = cones.multipliers()
+        pull = cones.back(self.Y)
+        self.r_d = self.weights * (self.x - self.target) + pull
+        excess = cones.excess()
+        objective = self.problem.objective(self.x)
+        most = float(cones.b @ norms)
+        linear = float(np.sum(self.Y * self.y_target)) - most * (1 + ROUNDING)
+        square = float(np.sum(pull[free] ** 2 / self.weights[free]))
+        bound = 0.5 * linear**2 / square if linear > 0 < square else 0.0
+        self.infeasible = bound > objective and bound > self.problem.largest_objective
+        priced = objective - bound + float(norms @ np.maximum(excess, 0.0))
+        self.gap = max(0.0, priced) / max(bound, self.floor)
+        self.violation = float(np.max(excess))
+        return max(STRICTER * self.violation, self.gap)
+
+    def step(self) -> None:
+        """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
+        cones, pattern = self.cones, self.state.pattern
+        data = np.zeros(len(pattern.indices))
+        pattern.add_diagonal(data, self.problem.weights)
+        cones.assemble(data)
+        self.state.linear.factorise(data)  # 3
+        total, r = cones.products(), cones.residuals()
+        mu = total / cones.degree
+        if self.keep and self.gap < SNAPSHOT and self.violation < SNAPSHOT:
+            self._snapshot(*self._direction(cones.corrector(mu), r))
+        _, affine = self._direction(cones.predictor(), r)
+        ratio = cones.products(affine, affine.length) / total
+        mu *= max(ratio**EXPONENT, LEAST_SIGMA)
+        r = r - affine.square
+        c = cones.corrector(mu, affine)  # 4
+        dx, change = self._direction(c, r)
+        for _ in range(CORRECTORS):  # 5
+            longer = min(1.0, change.length + LONGER)
+            c = cones.centrality(c, change, longer, LOW * mu, HIGH * mu)
+            dx_new, new = self._direction(c, r)
+            if new.length < change.length + GROWTH * (longer - change.length):
+                break
+            dx, change = dx_new, new
+        a = min(1.0, BACK_OFF * change.length)  # 6
+        self.x = self.x + a * dx
+        cones.s, cones.l = cones.moved(change, a)
+        cones.place(self.problem.bounds, self.x)
+
+    def _direction(self, c: FloatArray, r: FloatArray) -> tuple[FloatArray, Change]:
+        """One solve with the factor at hand: dx (n, 3), ds and dl."""
+        force = self.r_d + self.cones.push(c, r)
+        dx = np.zeros_like(force)
+        dx[self.free] = self.state.linear.solve(-force[self.free].ravel()).reshape(-1, 3)
+        return dx, self.cones.change(dx)
+
+    def _snapshot(self, dx: FloatArray, change: Change) -> None:
+        a = 0.9 * change.length
+        self.state.snapshot = (self.x + a * dx, *self.cones.moved(change, a), self.target)
+        self.keep = False
