@@ -64,7 +64,9 @@ class Admm(Solver):
     weights : "bound" minimises, row by row, the terms rho_i |z_i - z_i^0|^2 + |Y_i|^2 / rho_i of
         the bound on ADMM's error (Boyd et al. 2011, Eq. A.1), with the current z and multipliers
         in place of the optimal ones. "residuals" is the textbook's: all rho_i equal, doubled or
-        halved where one residual exceeds the other ten times (Boyd et al. 2011, Eq. 3.13).
+        halved where one residual exceeds the other ten times (Boyd et al. 2011, Eq. 3.13). "bound"
+        needs 3 to 12 times fewer iterations on the swing, and up to 8 times more on irregular
+        meshes with random masses (14 of the tests' random problems).
     relaxation : alpha.
     memory : former iterates in Anderson acceleration; 0 is none. With 6 it saves a tenth to a half
         of the iterations on the swing, each of which then takes two to three times as long.
