@@ -96,7 +96,7 @@ def test_a_variant_has_its_settings():
 
 def test_a_label_tells_what_differs_from_the_defaults():
     kind = type(find_solver("clarabel"))
-    assert kind(scaling=4.0).label == "clarabel[scaling=4.0]"
+    assert kind(scaling=8.0).label == "clarabel[scaling=8.0]"
     assert kind(form="paper").label == "clarabel[form=paper]"
     assert kind(form="paper", scaling=None, equilibrate=True).label == "clarabel-paper"
 
