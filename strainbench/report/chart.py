@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import matplotlib as mpl
@@ -16,6 +17,7 @@ from strainbench.report.table import groups
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#000000", "#999933")
 """Okabe and Ito's set for the colour-blind, its yellow darkened to be seen on white."""
 MARKERS = "osD^vP*X<>hp"
+LEGEND_INCHES = 2.2
 FLOOR_MM = 1e-6
 """Distances below are drawn here: the reference itself is not known better."""
 
@@ -44,9 +46,9 @@ def speed_accuracy(runs: pd.DataFrame, stem: Path) -> list[Path]:
     limits = sorted(runs["limit"].unique())
     resolutions = sorted(runs["resolution"].unique())
     style = styles(list(dict.fromkeys(runs["solver"])))
-    figure = Figure(
-        figsize=(2.2 + 3.4 * len(resolutions), 1.2 + 2.9 * len(limits)), layout="constrained"
-    )
+    width = LEGEND_INCHES + 3.4 * len(resolutions)
+    height = max(1.2 + 2.9 * len(limits), 1.0 + 0.2 * len(style))
+    figure = Figure(figsize=(width, height), layout="constrained")
     axes = figure.subplots(len(limits), len(resolutions), sharex=True, sharey=True, squeeze=False)
     known = 1000 * runs["distance_max"].dropna().clip(lower=FLOOR_MM / 1000)
     top = 30 * known.max() if len(known) else 1.0
@@ -58,7 +60,8 @@ def speed_accuracy(runs: pd.DataFrame, stem: Path) -> list[Path]:
         row[0].set_ylabel("distance to optimum [mm]")
     for ax in axes[-1]:
         ax.set_xlabel("seconds a projection")
-    figure.suptitle(group.title, size=11)
+    room = int(13 * (width - 2 * LEGEND_INCHES))  # in characters, beside the legend if centred
+    figure.suptitle("\n".join(wrap(group.title, max(room, 40))), size=11)
     figure.legend(handles=_legend(style), loc="outside right upper", frameon=False, fontsize=9)
     return save(figure, stem)
 
