@@ -89,7 +89,7 @@ def test_a_folder_that_cannot_be_written_to(tmp_path):
 
 
 def test_an_interrupt_exits_130_and_the_run_resumes(tmp_path):
-    words = [*RUN[:2], "--solver", "none,gauss-seidel", "--set", "resolution=20", "--steps", "20"]
+    words = [*RUN[:2], "--solver", "none,gauss-seidel", "--set", "resolution=30", "--steps", "40"]
     command = [sys.executable, "-m", "strainbench", *words]
     process = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
