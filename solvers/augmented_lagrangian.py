@@ -29,9 +29,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.reference import objective_floor
 from strainbench.warm import Memory
@@ -268,7 +268,7 @@ def judge(problem: Problem, G: Blocks, x: FloatArray, Y: FloatArray) -> tuple[fl
     return float(np.max(stretches - problem.bounds)), gap
 
 
-@njit(cache=True)
+@compiled
 def evaluate(G, t, b, rho, Y, x, local, Y_new, gradient):  # type: ignore[no-untyped-def]
     """Value and sum_i |Y+ - Y|^2 / 2 rho_i at x; the last three are filled."""
     for k in range(len(x)):
@@ -299,7 +299,7 @@ def evaluate(G, t, b, rho, Y, x, local, Y_new, gradient):  # type: ignore[no-unt
     return value, moved
 
 
-@njit(cache=True)
+@compiled
 def apply(G, i, x, y):  # type: ignore[no-untyped-def]
     """Fill y (m, 3) with G_i x."""
     for a in range(len(G.axes)):
@@ -312,7 +312,7 @@ def apply(G, i, x, y):  # type: ignore[no-untyped-def]
         y[a, 0], y[a, 1], y[a, 2] = y0, y1, y2
 
 
-@njit(cache=True)
+@compiled
 def spread(G, i, y, x):  # type: ignore[no-untyped-def]
     """Add G_i^T y to the free vertices of x (n, 3)."""
     for k in range(len(G.corners)):
@@ -325,7 +325,7 @@ def spread(G, i, y, x):  # type: ignore[no-untyped-def]
                 x[v, 2] += g * y[a, 2]
 
 
-@njit(cache=True)
+@compiled
 def decompose(Z, i, axes, local):  # type: ignore[no-untyped-def]
     """Singular values and vectors of Z (m, 3)."""
     if len(axes) == 1:
@@ -337,7 +337,7 @@ def decompose(Z, i, axes, local):  # type: ignore[no-untyped-def]
         local.V[i], local.s[i], local.Ut[i] = np.linalg.svd(Z)
 
 
-@njit(cache=True)
+@compiled
 def differentiate(i, axes, b, local, H, A):  # type: ignore[no-untyped-def]
     """Replace H (m, 3) by the derivative of Z - projection of Z along H, Z beyond; A is scratch.
 
@@ -370,7 +370,7 @@ def differentiate(i, axes, b, local, H, A):  # type: ignore[no-untyped-def]
     H[:] = V @ A @ Ut
 
 
-@njit(cache=True)
+@compiled
 def diagonal(G, b, rho, local):  # type: ignore[no-untyped-def]
     """(n, 3, 3) diagonal blocks of the Hessian; the identity at a pin."""
     blocks = np.zeros((len(G.M), 3, 3))
@@ -394,7 +394,7 @@ def diagonal(G, b, rho, local):  # type: ignore[no-untyped-def]
     return blocks
 
 
-@njit(cache=True)
+@compiled
 def product(G, b, rho, local, p, out):  # type: ignore[no-untyped-def]
     """Fill `out` with the Hessian times p (n, 3)."""
     for k in range(len(p)):
@@ -411,7 +411,7 @@ def product(G, b, rho, local, p, out):  # type: ignore[no-untyped-def]
             spread(G, i, H, out)
 
 
-@njit(cache=True)
+@compiled
 def conjugate_gradients(G, b, rho, local, inverse, gradient, steps):  # type: ignore[no-untyped-def]
     """(n, 3) Newton's step, to a tenth of the preconditioned gradient."""
     p, r, Hq = np.zeros_like(gradient), -gradient, np.empty_like(gradient)
@@ -431,7 +431,7 @@ def conjugate_gradients(G, b, rho, local, inverse, gradient, steps):  # type: ig
     return p
 
 
-@njit(cache=True)
+@compiled
 def precondition(inverse, r):  # type: ignore[no-untyped-def]
     """(n, 3) each block's inverse times its part of r."""
     z = np.empty_like(r)

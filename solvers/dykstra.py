@@ -36,9 +36,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.reference import objective_floor
 from strainbench.warm import Memory
@@ -203,7 +203,7 @@ def start(problem: Problem, G: Blocks, multipliers: FloatArray) -> tuple[Frame, 
     return frame, Run(x, Y, x.copy(), Y.copy(), 1.0, -np.inf)
 
 
-@njit(cache=True)
+@compiled
 def plain(G, frame, run, sweeps):  # type: ignore[no-untyped-def]
     """So many sweeps forwards, in place."""
     norms = np.zeros(len(G.steps))
@@ -212,7 +212,7 @@ def plain(G, frame, run, sweeps):  # type: ignore[no-untyped-def]
     return run
 
 
-@njit(cache=True)
+@compiled
 def accelerated(G, frame, run, sweeps):  # type: ignore[no-untyped-def]
     """So many sweeps, there and back."""
     x, Y, x_last, Y_last, momentum, dual = run
@@ -232,7 +232,7 @@ def accelerated(G, frame, run, sweeps):  # type: ignore[no-untyped-def]
     return Run(x, Y, x_last, Y_last, momentum, dual)
 
 
-@njit(cache=True)
+@compiled
 def sweep(G, b, x, Y, norms, back):  # type: ignore[no-untyped-def]
     """Steps 1 and 2 for each constraint, forwards or back; `norms` takes the |Y_i|."""
     Z = np.empty((len(G.axes), 3))
@@ -255,7 +255,7 @@ def sweep(G, b, x, Y, norms, back):  # type: ignore[no-untyped-def]
                     x[G.vertices[i, k], c] -= G.moves[i, a, k] * change
 
 
-@njit(cache=True)
+@compiled
 def stretch(G, i, x, y):  # type: ignore[no-untyped-def]
     """Fill y (m, 3) with G_i x."""
     for a in range(len(G.axes)):
@@ -268,7 +268,7 @@ def stretch(G, i, x, y):  # type: ignore[no-untyped-def]
         y[a, 0], y[a, 1], y[a, 2] = y0, y1, y2
 
 
-@njit(cache=True)
+@compiled
 def shrink(A, axes, t):  # type: ignore[no-untyped-def]
     """Lower the singular values of A (m, 3) by t; return the largest before, their sum after."""
     if len(axes) == 1:
@@ -296,7 +296,7 @@ def shrink(A, axes, t):  # type: ignore[no-untyped-def]
     return s, f * s + f2 * s2
 
 
-@njit(cache=True)
+@compiled
 def place(G, frame, x, Y):  # type: ignore[no-untyped-def]
     """Set x = t - W G^T Y."""
     x[:] = frame.t
@@ -307,7 +307,7 @@ def place(G, frame, x, Y):  # type: ignore[no-untyped-def]
                     x[G.vertices[i, k], c] -= G.moves[i, a, k] * Y[i, a, c]
 
 
-@njit(cache=True)
+@compiled
 def judge(G, frame, run):  # type: ignore[no-untyped-def]
     """Largest violation, gap and objective; x is set afresh.
 

@@ -33,9 +33,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.warm import Memory
 
@@ -164,7 +164,7 @@ def rows(problem: Problem) -> Rows:
     return Rows(vertices.astype(np.int32), g, moves, leverage, (0,) * g.shape[1])
 
 
-@njit(cache=True)
+@compiled
 def sweep(G, b, x, l, compliance, clamped, tolerance, sweeps):  # type: ignore[no-untyped-def]  # noqa: E741
     """Steps 1 to 3 on x and l in place, so often, or until nothing is violated by `tolerance`."""
     for number in range(sweeps):
@@ -191,7 +191,7 @@ def sweep(G, b, x, l, compliance, clamped, tolerance, sweeps):  # type: ignore[n
     return sweeps
 
 
-@njit(cache=True)
+@compiled
 def stretch(G, i, x):  # type: ignore[no-untyped-def]
     """Return y of row i."""
     y0 = y1 = y2 = 0.0
@@ -203,7 +203,7 @@ def stretch(G, i, x):  # type: ignore[no-untyped-def]
     return y0, y1, y2
 
 
-@njit(cache=True)
+@compiled
 def largest_violation(G, b, x):  # type: ignore[no-untyped-def]
     """Largest max(0, |y_i| - b_i); nothing moves."""
     worst = 0.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from strainbench import Problem
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.physics.linear import SuperLU
 
@@ -73,7 +73,7 @@ class Rows:
         return pull
 
 
-@njit(cache=True)
+@compiled
 def project_on_balls(v, bounds, z):  # type: ignore[no-untyped-def]
     """z_i = min(1, b_i / |v_i|) v_i."""
     for i in range(len(v)):
@@ -83,7 +83,7 @@ def project_on_balls(v, bounds, z):  # type: ignore[no-untyped-def]
             z[i, c] = factor * v[i, c]
 
 
-@njit(cache=True)
+@compiled
 def clamp_singular_values(v, bounds, z):  # type: ignore[no-untyped-def]
     """Each two rows times a function of their Gram matrix C, s -> min(1, b / s) of s^2.
 
@@ -103,7 +103,7 @@ def clamp_singular_values(v, bounds, z):  # type: ignore[no-untyped-def]
             z[2 * e + 1, k] = f1 * q[k] + slope * (c * p[k] - (half + radius) * q[k])
 
 
-@njit(cache=True)
+@compiled
 def add_pull(vertices, coefficients, w, v, z, start, pull):  # type: ignore[no-untyped-def]
     """pull += G^T W (2 z - v - start)."""
     for i in range(len(vertices)):

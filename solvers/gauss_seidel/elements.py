@@ -30,11 +30,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from solvers.gauss_seidel.strain import polar, strain_change, symmetric, violation
 from strainbench import Problem
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 
 ENTRIES = np.array([[1, 0], [0, 1], [0.5**0.5, 0.5**0.5], [0.5**0.5, -(0.5**0.5)]])
@@ -123,7 +123,7 @@ def levers_of(problem: Problem, gradients: FloatArray, strain: bool) -> FloatArr
     return np.where(pinned, 0.0, np.where(pins < 2, arms - centre, downhill))
 
 
-@njit(cache=True)
+@compiled
 def sweep_elements(  # type: ignore[no-untyped-def]
     vertices, gradients, levers, directions, columns, bounds, lower, x, tolerance, sweeps
 ):

@@ -12,10 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from strainbench import Problem
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 
 NO_LEVERAGE = 1e-12
@@ -63,7 +63,7 @@ def step_factors(problem: Problem) -> FloatArray:
     return steps
 
 
-@njit(cache=True)
+@compiled
 def sweep_rows(  # type: ignore[no-untyped-def]
     vertices, coefficients, steps, corners, bounds, lower, x, tolerance, sweeps
 ):

@@ -11,13 +11,14 @@ half difference of S_xx and S_yy, then these by |S e_x|^2 = S_xx^2 + S_xy^2 and 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from strainbench.compiled import compiled
 
 FLAT = 1e-12
 """Singular values smaller than this beside the larger one are rounding, without a direction."""
 
 
-@njit(cache=True)
+@compiled
 def polar(F):  # type: ignore[no-untyped-def]
     """Singular values s1 >= s2 of F (3, 2) and its first right vector (c, s); F becomes R.
 
@@ -46,7 +47,7 @@ def polar(F):  # type: ignore[no-untyped-def]
     return s1, s2, c, s
 
 
-@njit(cache=True)
+@compiled
 def unit(y, normal, least):  # type: ignore[no-untyped-def]
     """Length and direction of y; any direction orthogonal to `normal` where it is too short."""
     length = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
@@ -63,13 +64,13 @@ def unit(y, normal, least):  # type: ignore[no-untyped-def]
     return length, (other[0] / size, other[1] / size, other[2] / size)
 
 
-@njit(cache=True)
+@compiled
 def symmetric(first, second, c, s):  # type: ignore[no-untyped-def]
     """Entries xx, yy, xy of V diag(first, second) V^T."""
     return first * c * c + second * s * s, first * s * s + second * c * c, (first - second) * c * s
 
 
-@njit(cache=True)
+@compiled
 def violation(s1, s2, c, s, directions, bounds, lower):  # type: ignore[no-untyped-def]
     """Largest violation of a triangle's own limits."""
     if len(directions) == 0:
@@ -83,7 +84,7 @@ def violation(s1, s2, c, s, directions, bounds, lower):  # type: ignore[no-untyp
     return worst
 
 
-@njit(cache=True)
+@compiled
 def strain_change(s1, s2, c, s, columns, bounds, lower):  # type: ignore[no-untyped-def]
     """Entries xx, yy, xy of the change that clamps the strain to the limits."""
     xx, yy, xy = symmetric(s1, s2, c, s)
@@ -102,13 +103,13 @@ def strain_change(s1, s2, c, s, columns, bounds, lower):  # type: ignore[no-unty
     return x - xx, y - yy, z - xy
 
 
-@njit(cache=True)
+@compiled
 def room(column, bounds, lower):  # type: ignore[no-untyped-def]
     """Largest and least stretch along one of ENTRIES."""
     return (bounds[column], lower[column]) if column >= 0 else (np.inf, 0.0)
 
 
-@njit(cache=True)
+@compiled
 def leg(hypotenuse, other):  # type: ignore[no-untyped-def]
     """The other leg of a right triangle, 0 where there is none."""
     return np.sqrt(max(0.0, hypotenuse * hypotenuse - other * other))

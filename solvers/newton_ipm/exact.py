@@ -15,11 +15,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 
 from solvers.newton_ipm.mesh import Change, gather, spread, spread_blocks
 from solvers.newton_ipm.sampled import ROUNDING
 from strainbench import Problem
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import Pattern
 
@@ -202,7 +202,7 @@ def symmetric_product(A: FloatArray, B: FloatArray) -> FloatArray:
     return np.stack([A[:, 0] * B[:, 0] + cross, A[:, 1] * B[:, 1] + cross, mixed], axis=1)
 
 
-@njit(cache=True)
+@compiled
 def fill_congruent(R, A, out):  # type: ignore[no-untyped-def]
     """R A R^T for each element."""
     for e in range(len(A)):
@@ -213,7 +213,7 @@ def fill_congruent(R, A, out):  # type: ignore[no-untyped-def]
         out[e, 2] = p * r * a + (p * s + q * r) * b + q * s * d
 
 
-@njit(cache=True)
+@compiled
 def fill_push(inverse, d, c, r, y, scaled, h, Y):  # type: ignore[no-untyped-def]
     """scaled = R^-1 r R^-T, h = c/((d_p + d_q)/2) - scaled, and Y = R^-T h R^-1 y."""
     fill_congruent(inverse, r, scaled)
@@ -231,21 +231,21 @@ def fill_push(inverse, d, c, r, y, scaled, h, Y):  # type: ignore[no-untyped-def
             Y[2 * e + 1, i] = H2 * y[2 * e, i] + H1 * y[2 * e + 1, i]
 
 
-@njit(cache=True)
+@compiled
 def fill_rows(elements, gradients, corners, axes, x, y):  # type: ignore[no-untyped-def]
     """y = G x."""
     for e in range(len(elements)):
         gather(elements, gradients, corners, axes, e, x, y[2 * e : 2 * e + 2])
 
 
-@njit(cache=True)
+@compiled
 def add_back(elements, gradients, corners, axes, Y, out):  # type: ignore[no-untyped-def]
     """Add G^T Y to `out` (n, 3)."""
     for e in range(len(elements)):
         spread(elements, gradients, corners, axes, e, Y[2 * e : 2 * e + 2], out)
 
 
-@njit(cache=True)
+@compiled
 def add_hessian(elements, gradients, corners, axes, s, l, y, R, inverse, d, slots, stride, data):  # type: ignore[no-untyped-def] # noqa: E741
     """Scale each element (R, its inverse and d are filled in), then add its blocks."""
     H = np.empty((2, 2, 3, 3))
@@ -271,7 +271,7 @@ def add_hessian(elements, gradients, corners, axes, s, l, y, R, inverse, d, slot
         spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def scale(s, l, R, inverse, d):  # type: ignore[no-untyped-def] # noqa: E741
     """R with R^-1 S R^-T = R^T L R = diag(d), of one element.
 
@@ -303,7 +303,7 @@ def scale(s, l, R, inverse, d):  # type: ignore[no-untyped-def] # noqa: E741
     d[1] = p * sin * sin - 2 * r * cos * sin + q * cos * cos
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def fill_change(elements, gradients, corners, axes, dx, y, inverse, d, r, h, ds, dl, square):  # type: ignore[no-untyped-def]
     """dS~ = r~ - t, dL~ = h + t, square = dY dY^T/2; the step's length is returned."""
     F = np.empty((2, 3))
@@ -331,7 +331,7 @@ def fill_change(elements, gradients, corners, axes, dx, y, inverse, d, r, h, ds,
     return length
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def reach(d, change):  # type: ignore[no-untyped-def]
     """The largest a for which diag(d) + a change has no negative eigenvalue."""
     a, b = change[0] / d[0], change[1] / d[1]

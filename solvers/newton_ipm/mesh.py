@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from numba import njit
-
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 
 
@@ -30,7 +29,7 @@ class Change:
     length: float
 
 
-@njit(cache=True)
+@compiled
 def gather(elements, gradients, corners, axes, e, x, F):  # type: ignore[no-untyped-def]
     """F (dim, 3) = sum_a B_a x_a^T of element e."""
     for c in range(len(axes)):
@@ -43,7 +42,7 @@ def gather(elements, gradients, corners, axes, e, x, F):  # type: ignore[no-unty
         F[c, 0], F[c, 1], F[c, 2] = f0, f1, f2
 
 
-@njit(cache=True)
+@compiled
 def spread(elements, gradients, corners, axes, e, P, out):  # type: ignore[no-untyped-def]
     """Add sum_c B_ac P_c, of P (dim, 3), to each vertex a of element e in `out` (n, 3)."""
     for a in range(len(corners)):
@@ -54,7 +53,7 @@ def spread(elements, gradients, corners, axes, e, P, out):  # type: ignore[no-un
                 out[v, i] += B * P[c, i]
 
 
-@njit(cache=True)
+@compiled
 def spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data):  # type: ignore[no-untyped-def]
     """Add sum_cf B_ac B_bf H_cf, of H (dim, dim, 3, 3), to the block of each vertex pair a, b.
 
@@ -80,7 +79,7 @@ def spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data)
                 data[column + 2] += k2
 
 
-@njit(cache=True)
+@compiled
 def spread_symmetric(elements, gradients, corners, axes, e, H, slots, stride, data):  # type: ignore[no-untyped-def]
     """The same for H_cf = H_fc = H_cf^T, whose entries 00, 01, 02, 11, 12, 22 are H (dim, dim, 6).
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from solvers.newton_ipm.mesh import Change, gather, spread, spread_symmetric
 from strainbench import Problem
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import Pattern
 
@@ -129,7 +129,7 @@ class SampledCones:
         return self.s + a * change.s, self.l + a * change.l
 
 
-@njit(cache=True)
+@compiled
 def fill_rows(elements, gradients, corners, axes, d, x, y):  # type: ignore[no-untyped-def]
     """y = G x."""
     m = len(d)
@@ -143,7 +143,7 @@ def fill_rows(elements, gradients, corners, axes, d, x, y):  # type: ignore[no-u
                     y[e * m + j, i] += d[j, c] * F[c, i]
 
 
-@njit(cache=True)
+@compiled
 def add_back(elements, gradients, corners, axes, d, Y, out):  # type: ignore[no-untyped-def]
     """Add G^T Y to `out` (n, 3)."""
     m = len(d)
@@ -157,7 +157,7 @@ def add_back(elements, gradients, corners, axes, d, Y, out):  # type: ignore[no-
         spread(elements, gradients, corners, axes, e, P, out)
 
 
-@njit(cache=True)
+@compiled
 def add_push(elements, gradients, corners, axes, d, c, r, s, l, y, h, out):  # type: ignore[no-untyped-def] # noqa: E741
     """h = (c - l r)/s, and G^T (h y) added to `out` (n, 3)."""
     m = len(d)
@@ -174,7 +174,7 @@ def add_push(elements, gradients, corners, axes, d, c, r, s, l, y, h, out):  # t
         spread(elements, gradients, corners, axes, e, P, out)
 
 
-@njit(cache=True)
+@compiled
 def add_hessian(elements, gradients, corners, axes, d, l, z, y, slots, stride, data):  # type: ignore[no-untyped-def] # noqa: E741
     """Add sum_i l_i g g^T (x) I + z_i (g (x) y)(g (x) y)^T, by element and material axes."""
     m = len(d)
@@ -199,7 +199,7 @@ def add_hessian(elements, gradients, corners, axes, d, l, z, y, slots, stride, d
         spread_symmetric(elements, gradients, corners, axes, e, H, slots, stride, data)
 
 
-@njit(cache=True)
+@compiled
 def fill_change(elements, gradients, corners, axes, d, dx, y, s, l, z, r, h, ds, dl, square):  # type: ignore[no-untyped-def] # noqa: E741
     """ds = r - y.dy, dl = h + z y.dy, square = |dy|^2/2; the step's length is returned."""
     m = len(d)

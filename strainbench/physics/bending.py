@@ -8,8 +8,8 @@ Gauss-Newton Hessian 2 c grad(theta) grad(theta)^T is used: positive semidefinit
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import scatter
 from strainbench.problem import IntArray, rest_corners
@@ -43,7 +43,7 @@ def hinges(rest: FloatArray, elements: IntArray, areas: FloatArray) -> tuple[Int
     return np.array(quads, dtype=np.int64).reshape(-1, 4), np.array(weights)
 
 
-@njit(cache=True)
+@compiled
 def angle_and_gradient(x: FloatArray, hinge: IntArray, grad: FloatArray) -> float:
     """Hinge angle [rad]; its gradient (4, 3) [rad/m] is written to `grad`.
 
@@ -74,7 +74,7 @@ def angle_and_gradient(x: FloatArray, hinge: IntArray, grad: FloatArray) -> floa
     return float(np.arctan2(sine, n1[0] * n2[0] + n1[1] * n2[1] + n1[2] * n2[2]))
 
 
-@njit(cache=True)
+@compiled
 def add_bending_gradient(
     x: FloatArray, quads: IntArray, weights: FloatArray, out: FloatArray
 ) -> float:
@@ -90,7 +90,7 @@ def add_bending_gradient(
     return energy
 
 
-@njit(cache=True)
+@compiled
 def add_bending_hessian(
     x: FloatArray,
     quads: IntArray,

@@ -29,8 +29,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import GRAVITY
@@ -62,7 +62,7 @@ class BarrierSettings:
     )  # whether to clamp, and what c is multiplied by
 
 
-@njit(cache=True)
+@compiled
 def add_limits_hessian(
     coefficients: FloatArray,
     y: FloatArray,

@@ -13,14 +13,14 @@ gives the nearest positive semidefinite matrix.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.physics.pattern import scatter
 from strainbench.problem import IntArray
 
 
-@njit(cache=True)
+@compiled
 def deformation_gradient(x: FloatArray, triangle: IntArray, B: FloatArray, F: FloatArray) -> None:
     """Write F (3, 2) of one triangle: sum_k x_k B_k."""
     F[:] = 0.0
@@ -30,7 +30,7 @@ def deformation_gradient(x: FloatArray, triangle: IntArray, B: FloatArray, F: Fl
             F[a, 1] += x[triangle[k], a] * B[k, 1]
 
 
-@njit(cache=True)
+@compiled
 def singular_frames(F: FloatArray, U: FloatArray, s: FloatArray, V: FloatArray) -> None:
     """Thin SVD of a 3 x 2 matrix: U (3, 3) with the normal as third column, s (2,), V (2, 2)."""
     c00 = F[0, 0] ** 2 + F[1, 0] ** 2 + F[2, 0] ** 2
@@ -58,7 +58,7 @@ def singular_frames(F: FloatArray, U: FloatArray, s: FloatArray, V: FloatArray) 
         U[a, 2] = U[b, 0] * U[c, 1] - U[c, 0] * U[b, 1]
 
 
-@njit(cache=True)
+@compiled
 def add_membrane_gradient(
     x: FloatArray,
     triangles: IntArray,
@@ -88,7 +88,7 @@ def add_membrane_gradient(
     return energy
 
 
-@njit(cache=True)
+@compiled
 def eigenpairs(
     U: FloatArray,
     s: FloatArray,
@@ -129,7 +129,7 @@ def eigenpairs(
             Q[5, a, b] = U[a, 2] * V[b, 1]
 
 
-@njit(cache=True)
+@compiled
 def add_membrane_hessian(
     x: FloatArray,
     triangles: IntArray,

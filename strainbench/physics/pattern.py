@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
+from strainbench.compiled import compiled
 from strainbench.limits import FloatArray
 from strainbench.problem import IntArray
 
@@ -85,7 +85,7 @@ class Pattern:
         return sp.csc_array((data, self.indices, self.indptr), shape=2 * (self.size,))
 
 
-@njit(cache=True)
+@compiled
 def scatter(
     values: FloatArray,
     modes: FloatArray,
