@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from strainbench.discovery import find_scenario, find_solver, load_file
+from strainbench.reference import REFERENCE_SOLVER
 from strainbench.scenario import Scenario
 from strainbench.solver import Solver
+from strainbench.sources import closure, digest, plugin_files, plugin_source
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,8 @@ class PluginRef:
     label : with what sets it apart from the defaults
     parameters : all its fields
     path : of the file that it came from, or None for one of ours
-    content : digest of that file, and of files that its parameters name, when the run was
+    source : that file or folder in words: from the project's top for one of ours
+    content : digest of its source and of the files that its parameters name, when the run was
         planned: an edited file is another plug-in
     unavailable : why it cannot be loaded, or None
     """
@@ -32,19 +36,21 @@ class PluginRef:
     label: str
     parameters: tuple[tuple[str, object], ...] = ()
     path: str | None = None
+    source: str = ""
     content: str = ""
     unavailable: str | None = None
 
     @classmethod
     def of(cls, plugin: Solver | Scenario, path: str | None = None) -> PluginRef:
         """A reference to `plugin`, from the file at `path` unless it is ours."""
-        named = [v for v in plugin.parameters.values() if isinstance(v, str) and Path(v).is_file()]
-        files = [*([path] if path else []), *named]
-        content = _digest([Path(f).read_bytes().hex() for f in files]) if files else ""
-        return cls(plugin.name, plugin.label, tuple(plugin.parameters.items()), path, content)
+        source = path or plugin_source(type(plugin))
+        parameters = plugin.parameters
+        content = content_of(source, parameters.values())
+        return cls(plugin.name, plugin.label, tuple(parameters.items()), path, source, content)
 
     def solver(self) -> Solver:
-        """Load it as a solver."""
+        """Load it as a solver; ValueError if its source was edited since."""
+        self._check()
         if self.path is None:
             return replace(find_solver(self.name), **self._settings)
         return next(c for c in load_file(self.path, Solver) if c.name == self.name)(
@@ -52,9 +58,14 @@ class PluginRef:
         )
 
     def scenario(self) -> Scenario:
-        """Load it as a scenario."""
+        """Load it as a scenario; ValueError if its source was edited since."""
+        self._check()
         classes = load_file(self.path, Scenario) if self.path else [find_scenario(self.name)]
         return next(c for c in classes if c.name == self.name)(**self._settings)
+
+    def _check(self) -> None:
+        if self.content != content_of(self.source, self._settings.values()):
+            raise ValueError(f"{self.source}, or a file that it reads, was edited during the run")
 
     @property
     def _settings(self) -> dict[str, Any]:
@@ -64,6 +75,25 @@ class PluginRef:
     def identity(self) -> list[object]:
         """What sets it apart from any other."""
         return [self.name, dict(self.parameters), self.content]
+
+
+def content_of(source: str, settings: Iterable[object]) -> str:
+    """Digest of a plug-in's own source, what it imports from beside it, and the files it reads.
+
+    Raises
+    ------
+    FileNotFoundError
+        If the source is not there.
+    """
+    return digest([*closure(*plugin_files(source), suite=False), *_named_files(source, settings)])
+
+
+def _named_files(source: str, settings: Iterable[object]) -> list[Path]:
+    """The files that settings name, as they stand or in the data folder beside a plug-in."""
+    words = [Path(v) for v in settings if isinstance(v, str | Path) and str(v)]
+    places = [(word, plugin_files(source)[0].parent / "data" / word) for word in words]
+    found = [next((file for file in place if file.is_file()), None) for place in places]
+    return [file for file in found if file]
 
 
 @dataclass(frozen=True)
@@ -76,6 +106,7 @@ class Cell:
     steps : time steps
     tolerance : aimed at by the solver
     time_limit : [s] for physics and solver together, or None
+    threads : in the solver's BLAS, OpenMP, numba and rayon
     """
 
     scenario: PluginRef
@@ -84,23 +115,26 @@ class Cell:
     steps: int
     tolerance: float
     time_limit: float | None = None
+    threads: int = 1
 
     @property
     def key(self) -> str:
-        """A digest of what the cell measures; the time limit is not part of it."""
-        return _digest(
-            [self.scenario.identity, self.solver.identity, self.mode, self.steps, self.tolerance]
-        )
+        """A digest of what the cell's numbers depend on; the time limit is not part of it."""
+        plugins = [self.scenario.identity, self.solver.identity]
+        return _digest([*plugins, self.mode, self.steps, self.tolerance, self.threads])
 
     @property
     def recording_key(self) -> str:
-        """A digest of what the replayed frames depend on, the code that makes them included."""
-        code = Path(__file__).parent
-        sources = [*sorted((code / "physics").glob("*.py")), code / "scenario.py", code / "mesh.py"]
-        if self.scenario.path is None:
-            sources.append(code.parent / "scenarios" / f"{self.scenario.name.replace('-', '_')}.py")
-        content = hashlib.sha256(b"".join(f.read_bytes() for f in sources)).hexdigest()
-        return _digest([self.scenario.identity, self.steps, content])
+        """A digest of what the replayed frames depend on: the scene, and all code behind them.
+
+        Raises
+        ------
+        FileNotFoundError
+            If a source is not there.
+        """
+        recorder = plugin_source(type(find_solver(REFERENCE_SOLVER)))
+        sources = [f for s in (self.scenario.source, recorder) for f in plugin_files(s)]
+        return _digest([self.scenario.identity, self.steps, digest(closure(*sources))])
 
     @property
     def title(self) -> str:

@@ -118,9 +118,8 @@ def run(
     rerun: Annotated[bool, typer.Option("--rerun", help="run finished cells again")] = False,
 ) -> None:
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
-    for name, value in (("--jobs", jobs), ("--threads", threads)):
-        if value < 1:
-            raise ValueError(f"{name} {value}: a whole number above 0 is valid")
+    if jobs < 1:
+        raise ValueError(f"--jobs {jobs}: a whole number above 0 is valid")
     if memory_limit is not None and not memory_limit > 0:
         raise ValueError(f"--memory-limit {memory_limit}: a number of MB above 0 is valid")
     if steps is not None and duration is not None:
@@ -135,6 +134,7 @@ def run(
         time_limit,
         duration,
         start.split(","),
+        threads,
     )
     if "cold" not in start and (cold := never_warm(solver or ["all"])):
         left_out = f"left out, as they cannot start warm: {', '.join(cold)}"

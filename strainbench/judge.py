@@ -17,6 +17,7 @@ from strainbench.records import SCHEMA
 from strainbench.referee import OUTCOMES, Certificate, certify
 from strainbench.reference import ReferenceSolver
 from strainbench.scenario import StepReport
+from strainbench.sources import suite_digest
 
 VIOLATION, GAP = 1e-6, 1e-4
 """The thresholds of every outcome in a results folder; printed with each table."""
@@ -173,6 +174,12 @@ def identity(cell: Cell) -> dict[str, object]:
         "gap_threshold": GAP,
         "scenario_parameters": _as_json(cell.scenario),
         "solver_parameters": _as_json(cell.solver),
+        "threads": cell.threads,
+        "solver_name": cell.solver.name,
+        "solver_source": cell.solver.source,
+        "scenario_source": cell.scenario.source,
+        "content": f"{cell.scenario.content} {cell.solver.content}",
+        "suite": suite_digest(),
     }
 
 

@@ -12,6 +12,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import psutil
 from cpuinfo import get_cpu_info
+from threadpoolctl import threadpool_info
+
+from strainbench.physics.linear import available_linear_solvers
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -21,11 +24,18 @@ THREAD_VARIABLES = (
     "RAYON_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
-PACKAGES = ("clarabel", "cvxpy", "cyipopt", "numba", "numpy", "osqp", "scipy", "strainbench")
+PACKAGES = (
+    *("casadi", "clarabel", "cvxopt", "cvxpy", "cyipopt", "ecos", "llvmlite", "mkl", "mosek"),
+    *("numba", "numpy", "osqp", "pypardiso", "qdldl", "qoco", "scipy", "scs", "strainbench"),
+)
+"""Those that a time depends on; casadi's wheel carries Ipopt and MUMPS."""
 
 
 def describe_machine(threads: int) -> tuple[str, dict[str, object]]:
-    """A short name and the facts: processor, memory, system, versions, threads a solver."""
+    """A short name and the facts: processor, memory, system, libraries, threads a solver.
+
+    The linear solver is that of newton-ipm and implicit Euler, the fastest that is installed.
+    """
     cpu = get_cpu_info()
     model = str(cpu.get("brand_raw", platform.processor() or "unknown processor"))
     facts: dict[str, object] = {
@@ -35,10 +45,19 @@ def describe_machine(threads: int) -> tuple[str, dict[str, object]]:
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "threads_per_solver": threads,
+        "linear_solver": available_linear_solvers()[0].name,
+        "blas": _blas(),
         "packages": {name: _version(name) for name in PACKAGES},
     }
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:6]
     return f"{model}, {facts['cores']} cores ({digest})", facts
+
+
+def _blas() -> list[str]:
+    """The BLAS libraries that NumPy and SciPy have loaded, and the kernels that they chose."""
+    pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
+    names = ("internal_api", "version", "architecture")
+    return sorted({" ".join(str(pool.get(n) or "") for n in names).strip() for pool in pools})
 
 
 def _version(package: str) -> str:

@@ -153,6 +153,7 @@ def plan(
     time_limit: float | None,
     duration: float | None = None,
     starts: Sequence[str] = ("cold",),
+    threads: int = 1,
 ) -> list[Cell]:
     """All cells of a run; with a `duration` [s] each has its own number of steps, and not `steps`.
 
@@ -167,8 +168,9 @@ def plan(
     """
     if mode not in MODES:
         raise ValueError(f"--mode {mode}: valid are {', '.join(MODES)}")
-    if steps < 1:
-        raise ValueError(f"--steps {steps}: a whole number above 0 is valid")
+    for name, count in (("--steps", steps), ("--threads", threads)):
+        if count < 1:
+            raise ValueError(f"{name} {count}: a whole number above 0 is valid")
     times = (("--time-limit", [time_limit]), ("--duration", [duration]))
     for name, values in (("--tolerance", tolerances), *times):
         for value in values:
@@ -188,7 +190,7 @@ def plan(
             raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
     counts = {s: steps if duration is None else steps_for(s, duration) for s in scenes}
     cells = [
-        Cell(scene, method, mode, counts[scene], tolerance, time_limit)
+        Cell(scene, method, mode, counts[scene], tolerance, time_limit, threads)
         for scene, method, tolerance in product(scenes, methods, tolerances)
     ]
     return list({cell.key: cell for cell in cells}.values())

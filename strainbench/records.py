@@ -62,6 +62,12 @@ RUN_COLUMNS = (
     "scenario_parameters",
     "solver_parameters",
     "machine",
+    "threads",
+    "solver_name",
+    "solver_source",
+    "scenario_source",
+    "content",
+    "suite",
 )
 STEP_COLUMNS = (
     "cell",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import hashlib
+import inspect
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
@@ -43,6 +44,27 @@ def digest(files: Iterable[Path]) -> str:
     """Of the contents alone: 16 hexadecimal digits, wherever the files lie."""
     contents = (hashlib.sha256(file.read_bytes()).digest() for file in files)
     return hashlib.sha256(b"".join(sorted(contents))).hexdigest()[:16]
+
+
+def plugin_source(kind: type) -> str:
+    """The file or folder of a plug-in of ours, from the project's top; else its class's file."""
+    package, _, rest = kind.__module__.partition(".")
+    if package not in PACKAGES:
+        return inspect.getfile(kind)
+    target = Path(package, rest.split(".")[0])
+    return (target if (ROOT / target).is_dir() else target.with_suffix(".py")).as_posix()
+
+
+def plugin_files(source: str) -> list[Path]:
+    """The files of a plug-in's source: itself, or all modules in the folder."""
+    path = ROOT / source
+    return sorted(path.rglob("*.py")) if path.is_dir() else [path]
+
+
+@cache
+def suite_digest() -> str:
+    """Of the suite's own source."""
+    return digest(SUITE.rglob("*.py"))
 
 
 @cache
