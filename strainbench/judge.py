@@ -175,7 +175,6 @@ def identity(cell: Cell) -> dict[str, object]:
         "scenario_parameters": _as_json(cell.scenario),
         "solver_parameters": _as_json(cell.solver),
         "threads": cell.threads,
-        "solver_name": cell.solver.name,
         "solver_source": cell.solver.source,
         "scenario_source": cell.scenario.source,
         "content": f"{cell.scenario.content} {cell.solver.content}",

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 
@@ -47,7 +47,7 @@ def describe_machine(threads: int) -> tuple[str, dict[str, object]]:
         "threads_per_solver": threads,
         "linear_solver": available_linear_solvers()[0].name,
         "blas": _blas(),
-        "packages": {name: _version(name) for name in PACKAGES},
+        "packages": installed(PACKAGES),
     }
     digest = hashlib.sha256(json.dumps(facts, sort_keys=True).encode()).hexdigest()[:6]
     return f"{model}, {facts['cores']} cores ({digest})", facts
@@ -58,6 +58,11 @@ def _blas() -> list[str]:
     pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]
     names = ("internal_api", "version", "architecture")
     return sorted({" ".join(str(pool.get(n) or "") for n in names).strip() for pool in pools})
+
+
+def installed(packages: Iterable[str]) -> dict[str, str]:
+    """The packages' versions, or "not installed"."""
+    return {name: _version(name) for name in packages}
 
 
 def _version(package: str) -> str:

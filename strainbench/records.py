@@ -63,7 +63,6 @@ RUN_COLUMNS = (
     "solver_parameters",
     "machine",
     "threads",
-    "solver_name",
     "solver_source",
     "scenario_source",
     "content",

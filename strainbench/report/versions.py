@@ -1,0 +1,110 @@
+"""Which rows of a results folder are shown: those of the code as it is now; what is said of others.
+
+Rows are about the same thing if scene, solver, settings and the files that they come from are the
+same. Of these the newest one is shown whose sources are as they are now; where there is none, the
+newest, which is then said to be older. The others stay in runs.csv.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from strainbench.cell import content_of
+from strainbench.machine import installed
+from strainbench.records import Row, latest_runs, read_machines
+from strainbench.sources import ROOT, suite_digest
+
+PLUGINS = ("scenario", "solver")
+SAME = ("scenario", "scenario_parameters", "solver_parameters", "mode", "steps_asked", "tolerance")
+UNKNOWN = "by another version of strainbench"
+
+
+def shown_runs(folder: Path) -> list[Row]:
+    """The rows to show, with what is older about them in `older`, and names that tell them apart.
+
+    Raises
+    ------
+    RecordsError
+        If the records are damaged.
+    """
+    machines = read_machines(folder)
+    kept: dict[tuple[str, ...], Row] = {}
+    for row in latest_runs(folder).values():
+        row = row | {"older": _older_source(row)}
+        before = kept.get(_subject(row))
+        if before is None or before["older"] or not row["older"]:
+            kept[_subject(row)] = row
+    for row in kept.values():
+        row["older"] = row["older"] or _older_suite(row, machines.get(row["machine"], {}))
+    rows = list(kept.values())
+    for name in ("solver", "scenario"):
+        _tell_apart(rows, name)
+    return rows
+
+
+def said_of_older(rows: Iterable[Mapping[str, str]]) -> list[str]:
+    """A line for each way in which rows are older than what is installed."""
+    rows = list(rows)
+    counts = Counter(row["older"] for row in rows if row["older"])
+    return [f"{n} of {len(rows)} cells were measured {older}." for older, n in counts.items()]
+
+
+def _subject(row: Row) -> tuple[str, ...]:
+    """What a row is about, whatever its source was."""
+    method = row["solver"].partition("[")[0]  # what follows are settings
+    files = (_outside(row[f"{name}_source"]) for name in PLUGINS)
+    return (method, *files, row["threads"] or "1", *(row[name] for name in SAME))
+
+
+def _outside(source: str) -> str:
+    """The path of a plug-in from outside, nothing for one of ours."""
+    return source if os.path.isabs(source) else ""
+
+
+def _older_source(row: Row) -> str:
+    """How the sources differ from those that a row was measured with."""
+    if not row["content"]:
+        return UNKNOWN
+    for name, content in zip(PLUGINS, row["content"].split(), strict=True):
+        source = row[f"{name}_source"]
+        if not (ROOT / source).exists():
+            return f"with {source}, which is gone"
+        settings = json.loads(row[f"{name}_parameters"] or "{}").values()
+        if content_of(source, settings) != content:
+            return f"with {source} before its latest edit"
+    return ""
+
+
+def _older_suite(row: Row, facts: Mapping[str, object]) -> str:
+    """How the suite and the packages differ from those installed."""
+    if row["suite"] != suite_digest():
+        return UNKNOWN
+    packages = facts.get("packages")
+    if isinstance(packages, Mapping):
+        now = installed(packages)
+        changed = [f"{n} {packages[n]} (now {now[n]})" for n in packages if packages[n] != now[n]]
+        if changed:
+            return "with " + ", ".join(changed)
+    return ""
+
+
+def _tell_apart(rows: Sequence[Row], name: str) -> None:
+    """Add the file to names that plug-ins of several files share."""
+    sources: dict[str, set[str]] = {}
+    for row in rows:
+        sources.setdefault(row[name], set()).add(_outside(row[f"{name}_source"]))
+    for row in rows:
+        shared = sources[row[name]]
+        if len(shared) > 1:
+            row[name] = f"{row[name]} ({_short(_outside(row[f'{name}_source']), shared)})"
+
+
+def _short(source: str, others: Iterable[str]) -> str:
+    """The end of a path from where it differs from the others'."""
+    folders = [os.path.dirname(other) for other in others if other]
+    common = os.path.commonpath(folders) if source and folders else ""
+    return os.path.relpath(source, common) if common else source or "file unknown"
