@@ -10,11 +10,12 @@ FIELD  ?= $(LOCAL)/field
 FAILURES ?= $(LOCAL)/failures
 DIRECTIONS ?= $(LOCAL)/directions
 HARD   := --set resolution=10 --time-limit 20 --results $(FAILURES)
+TESTS  := $(BIN)/python -m pytest -q --numprocesses=2 --dist=loadgroup
 TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipopt,ipopt-default \
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test check perf report clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick check perf report clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -55,13 +56,16 @@ certificates: setup ## 200 random problems with all solvers: no certificate cont
 	$(BIN)/python -m pytest -q tests/test_certificates.py --problems 200
 
 test: setup ## the tests
-	$(BIN)/python -m pytest -q
+	$(TESTS)
+
+quick: setup ## the tests without the slow ones: under a minute once compiled
+	$(TESTS) -m "not slow"
 
 check: setup ## format, lint, types, tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -q
+	$(TESTS)
 
 perf: setup ## pytest-benchmark on recorded frames; writes results/local/perf.json
 	@mkdir -p $(LOCAL)

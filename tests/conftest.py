@@ -7,6 +7,7 @@ import pytest
 
 from tests.tally import Tally
 
+RUNNING = {"test_runner", "test_cluster", "test_cli", "test_converge", "test_readme"}
 TALLY = pytest.StashKey[Tally]()
 
 
@@ -22,6 +23,13 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.stash[TALLY] = Tally()
+
+
+def pytest_collection_modifyitems(items):
+    """Tests that start runs of their own go one after the other, in one of xdist's processes."""
+    for item in items:
+        if item.path.stem in RUNNING:
+            item.add_marker(pytest.mark.xdist_group("runs"))
 
 
 def pytest_terminal_summary(terminalreporter, config):
