@@ -33,6 +33,8 @@ class SphereDrop(ClothScenario):
 
     name = "sphere-drop"
     needs = frozenset({"inertia", "gravity", "membrane", "bending", "contact"})
+    begins = float(np.sqrt(2 * GAP / 9.81))
+    lasts = 0.4  # the corners meet the floor at 0.25 s
 
     norm: str = "mass"
     step: float = 1 / 200

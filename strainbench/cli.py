@@ -47,7 +47,6 @@ DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
 DEFAULT_CONVERGENCE = Path("results/local/convergence")
 DEFAULT_DUEL = Path("results/local/duel")
-DEFAULT_STEPS = 10
 INTERRUPTED = 130  # exit status after Ctrl-C
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
@@ -86,7 +85,7 @@ def run(
         typer.Option("--set", help="KEY=V1,V2 of the scenario, or SOLVER.KEY=V1,V2"),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(help=f"time steps a cell; {DEFAULT_STEPS} if not given")
+        int | None, typer.Option(help="time steps a cell; if not given, what the scene takes")
     ] = None,
     duration: Annotated[
         float | None, typer.Option(help="seconds of the scene's time a cell, instead of --steps")
@@ -129,7 +128,7 @@ def run(
         solver or ["all"],
         set_ or [],
         mode,
-        DEFAULT_STEPS if steps is None else steps,
+        steps,
         _numbers(tolerance),
         time_limit,
         duration,

@@ -16,7 +16,7 @@ from strainbench.play import read_events, read_frames
 from strainbench.records import SCHEMA
 from strainbench.referee import OUTCOMES, Certificate, certify
 from strainbench.reference import ReferenceSolver
-from strainbench.scenario import StepReport
+from strainbench.scenario import Scenario, StepReport
 from strainbench.sources import suite_digest
 
 VIOLATION, GAP = 1e-6, 1e-4
@@ -40,6 +40,8 @@ def judge(
     certificates = _certificates(cell, folder, len(projections), cache)
     steps = _step_rows(cell, events, projections, certificates)
     row = _run_row(cell, events, projections, certificates, ending)
+    missed = _missed(cell.scenario.scenario(), folder, len(projections), int(str(row["steps_done"])))
+    row["reason"] = "; ".join(filter(None, [str(row["reason"]), *missed]))
     row["judge_seconds"] = time.perf_counter() - begin
     return row, steps
 
@@ -54,6 +56,21 @@ def _certificates(cell: Cell, folder: Path, count: int, cache: Path | None) -> l
         frame = problem.with_target(target)
         certificates.append(certify(frame, positions, VIOLATION, GAP, references(frame)))
     return certificates
+
+
+def _missed(scene: Scenario, folder: Path, count: int, steps: int) -> list[str]:
+    """What a scene is for and `steps` steps of it, with `count` frames, never came to."""
+    if not count:
+        return []
+    problem, words = scene.problem(), []
+    candidates = [target for target, _ in read_frames(folder, count)]
+    if not any(np.any(problem.violations(target)) for target in candidates):
+        words.append("no candidate was beyond the limits: nothing had to be projected")
+    if not any(scene.has_begun(target) for target in candidates):
+        first = scene.first_step
+        later = f"; it begins at about step {first:g}" if steps < first < np.inf else ""
+        words.append(f"{scene.about} never happened in these {steps} steps{later}")
+    return words
 
 
 def _step_rows(
@@ -97,8 +114,15 @@ def _run_row(
     ending: str,
 ) -> dict[str, object]:
     by_name = {e["event"]: e for e in events}
+    in_time = _in_time(cell, events, projections)
     steps = [e for e in events if e["event"] == "step"]
-    seconds = [e["seconds"] for e in projections] + _cut_off(cell, events, ending)
+    if in_time < len(projections):  # what came back late is no answer, nor is its step done
+        ending = f"time limit of {cell.time_limit:g} s"
+        steps = [e for e in steps if e["step"] < projections[in_time]["step"]]
+        certificates = certificates[:in_time]
+    seconds = [e["seconds"] for e in projections]
+    if in_time == len(projections):
+        seconds += _cut_off(cell, events, ending)
     outcome, reason = _outcome(cell, events, certificates, len(steps), ending)
     loaded = by_name.get("loaded", {})
     row: dict[str, object] = identity(cell) | {
@@ -119,7 +143,7 @@ def _run_row(
         "distance_max": _of(max, [c.distance for c in certificates]),
         "distance_bound_max": _of(max, [c.distance_bound for c in certificates]),
         "reference_error_max": _of(max, [c.reference_error for c in certificates]),
-        "projections": len(certificates),
+        "projections": len(projections),
         "projections_violated": sum(c.outcome == "violated" for c in certificates),
         "projections_optimal": sum(c.outcome == "optimal" for c in certificates),
         "newton_failures": sum(not e["newton_converged"] for e in steps),
@@ -141,6 +165,14 @@ def _badness(certificate: Certificate) -> float:
     if c.outcome == "violated":
         return c.max_violation
     return c.kkt_residual if np.isnan(c.relative_gap) else c.relative_gap
+
+
+def _in_time(cell: Cell, events: list[dict[str, Any]], projections: list[dict[str, Any]]) -> int:
+    """How many projections, the first ones, came back before the cell's time was over."""
+    if cell.time_limit is None:
+        return len(projections)
+    end = cell.time_limit + next(e["at"] for e in events if e["event"] == "started")
+    return sum(e["at"] <= end for e in projections)
 
 
 def _cut_off(cell: Cell, events: list[dict[str, Any]], ending: str) -> list[float]:

@@ -135,8 +135,10 @@ def from_file(path: str) -> list[Solver]:
     return found
 
 
-def steps_for(scene: PluginRef, duration: float) -> int:
-    """The time steps of a scene that come nearest to `duration` [s], at least one."""
+def steps_for(scene: PluginRef, duration: float | None) -> int:
+    """The time steps of a scene that come nearest to `duration` [s], at least one, or its own."""
+    if duration is None:
+        return scene.scenario().usual_steps
     step = dict(scene.parameters).get("step")
     if not isinstance(step, int | float):
         raise ValueError(f"--duration {duration:g}: no time passes in {scene.name}; give --steps")
@@ -148,14 +150,15 @@ def plan(
     solvers: Sequence[str],
     settings: Sequence[str],
     mode: str,
-    steps: int,
+    steps: int | None,
     tolerances: Sequence[float],
     time_limit: float | None,
     duration: float | None = None,
     starts: Sequence[str] = ("cold",),
     threads: int = 1,
 ) -> list[Cell]:
-    """All cells of a run; with a `duration` [s] each has its own number of steps, and not `steps`.
+    """All cells of a run; each scene has its own number of steps with a `duration` [s], and where
+    neither that nor `steps` is given.
 
     Parameters
     ----------
@@ -169,7 +172,7 @@ def plan(
     if mode not in MODES:
         raise ValueError(f"--mode {mode}: valid are {', '.join(MODES)}")
     for name, count in (("--steps", steps), ("--threads", threads)):
-        if count < 1:
+        if count is not None and count < 1:
             raise ValueError(f"{name} {count}: a whole number above 0 is valid")
     times = (("--time-limit", [time_limit]), ("--duration", [duration]))
     for name, values in (("--tolerance", tolerances), *times):
@@ -188,7 +191,10 @@ def plan(
         if owner and owner not in owners:
             valid = ", ".join(sorted(owners))
             raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
-    counts = {s: steps if duration is None else steps_for(s, duration) for s in scenes}
+    counts = {
+        s: steps_for(s, duration) if duration is not None or steps is None else steps
+        for s in scenes
+    }
     cells = [
         Cell(scene, method, mode, counts[scene], tolerance, time_limit, threads)
         for scene, method, tolerance in product(scenes, methods, tolerances)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -32,7 +33,10 @@ Each method's iterates or answers, measured by the referee: a value is reached a
 from which on all are at most that. Methods marked ° show no iterates: these are whole runs at ever
 tighter tolerances, their seconds and iterations those of one such run. Seconds are on the
 solver's clock, set-up apart; the clock stands still while an iterate is kept. The gap is relative
-to the certified optimum, violations priced in."""
+to the certified optimum, violations priced in. Never: not even at the tightest tolerance, where the
+method ended by itself. Not within: the budget, which is for all of a method's runs together, ended
+first, and what it cut off is not counted. `-`: the method was stopped, or stopped, for the reason
+given below."""
 
 
 def load_convergence(folder: Path) -> pd.DataFrame:
@@ -65,6 +69,14 @@ def reached(rows: pd.DataFrame, measure: str, level: float) -> pd.Series | None:
     above = ~(rows[measure] <= level)
     after = rows[~above[::-1].cummax()[::-1]]
     return None if after.empty else after.iloc[0]
+
+
+def unreached(rows: pd.DataFrame) -> str:
+    """Why a solver's samples do not reach a level: its budget, itself, or what stopped it."""
+    first = rows.iloc[0]
+    if first["ending"].startswith("time limit"):
+        return f"not within {first['time_limit']:g} s"
+    return "never" if first["ending"].startswith("it says") else "-"
 
 
 def write_convergence(folder: Path) -> list[Path]:
@@ -102,10 +114,14 @@ def _table(table: pd.DataFrame, measure: str) -> str:
         line = [name]
         for level in LEVELS:
             at = reached(rows, measure, level)
-            line += ["-", "-"] if at is None else [f"{at.seconds:.2g}", f"{at.iterations:.0f}"]
+            line += [unreached(rows), ""] if at is None else _effort(at)
         last = rows[measure].iloc[-1]
         lines.append([*line, "-" if pd.isna(last) else power(last)])
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _effort(sample: pd.Series) -> list[str]:
+    return [f"{sample['seconds']:.2g}", f"{sample['iterations']:.0f}"]
 
 
 def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
@@ -124,8 +140,8 @@ def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
             for label, rows in drawn:
                 _curve(ax, rows, against, measure, floor, style[label], label.endswith("°"))
             _frame(ax, start[measure], limits.get(measure, 0.0))
-        lowest = min(rows[measure].min() for _, rows in drawn)
-        row[0].set_ylim(max(lowest, floor) / 3, ABOVE * start[measure])
+        lowest = np.fmax(table[measure].min(), floor)
+        row[0].set_ylim(lowest / 3, ABOVE * np.fmax(start[measure], lowest))
         row[0].set_ylabel(name)
     for ax, (_, name) in zip(axes[-1], AXES, strict=True):
         ax.set_xlabel(name)
@@ -172,5 +188,5 @@ def _frame(ax: Axes, start: float, resolved: float) -> None:
     ax.set_yscale("log")
     ax.grid(visible=True, which="major", color="#dddddd", linewidth=0.6)
     ax.axhline(start, **ITSELF)
-    if resolved > 0:
+    if 0 < resolved < float("inf"):
         ax.axhline(resolved, **RESOLVED)
