@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from strainbench import escape
 from strainbench.records import RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_markdown
@@ -57,7 +58,7 @@ def write_report(folder: Path) -> list[Path]:
     runs = load_runs(folder)
     machines = read_machines(folder)
     paths = {n: folder / n for n in ("table1.csv", "table1.md", "table1.tex", "index.html")}
-    tidy(runs).to_csv(paths["table1.csv"], index=False)
+    tidy(runs).map(escape.cell).to_csv(paths["table1.csv"], index=False)
     markdown = as_markdown(runs, machines)
     paths["table1.md"].write_text(markdown)
     if swept := sweep_markdown(runs):
@@ -66,7 +67,7 @@ def write_report(folder: Path) -> list[Path]:
     failed = failures(folder, runs)
     if len(failed):
         paths |= {n: folder / n for n in ("failures.csv", "failures.md")}
-        failed.to_csv(paths["failures.csv"], index=False)
+        failed.map(escape.cell).to_csv(paths["failures.csv"], index=False)
         paths["failures.md"].write_text(failures_markdown(failed, runs, machines))
     if table := energy_markdown(folder, runs):
         paths["energy.md"] = folder / "energy.md"

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from strainbench import escape
 from strainbench.converge import CANDIDATE, COLUMNS, CONVERGENCE
 from strainbench.records import RecordsError, read_machines, read_rows
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
@@ -92,13 +93,15 @@ def as_markdown(table: pd.DataFrame, machines: Any) -> str:
     first = table.iloc[0]
     title = f"{first['scenario']}, projection {first['frame']:.0f}"
     parts = [
-        f"# Convergence: {title}",
+        f"# Convergence: {escape.markdown(title)}",
         f"{first['variables']:.0f} variables, {first['constraints']:.0f} constraints. "
         + EXPLANATION.replace("\n", " "),
     ]
     for measure, name in (("relative_gap", "relative gap"), ("max_violation", "violation")):
         parts.append(f"## To reach a {name}\n\n" + _table(table, measure))
-    endings = [f"- {name}: {rows['ending'].iloc[0]}" for name, rows in methods(table)]
+    endings = [
+        f"- {escape.markdown(f'{name}: {rows.ending.iloc[0]}')}" for name, rows in methods(table)
+    ]
     parts.append("## How each ended\n\n" + "\n".join(endings))
     parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
     return "\n\n".join(parts) + "\n"
@@ -111,7 +114,7 @@ def _table(table: pd.DataFrame, measure: str) -> str:
         header += [f"{power(level)} [s]", "iterations"]
     lines = [[*header, "at the end"], ["---"] * (len(header) + 1)]
     for name, rows in methods(table):
-        line = [name]
+        line = [escape.markdown(name)]
         for level in LEVELS:
             at = reached(rows, measure, level)
             line += [unreached(rows), ""] if at is None else _effort(at)
@@ -145,8 +148,11 @@ def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
         row[0].set_ylabel(name)
     for ax, (_, name) in zip(axes[-1], AXES, strict=True):
         ax.set_xlabel(name)
-    figure.suptitle(f"{start['scenario']}, projection {start['frame']:.0f}", size=11)
-    handles = [Line2D([], [], label=n, **_line(n.endswith("°")), **style[n]) for n, _ in drawn]
+    figure.suptitle(escape.chart(f"{start['scenario']}, projection {start['frame']:.0f}"), size=11)
+    handles = [
+        Line2D([], [], label=escape.chart(n), **_line(n.endswith("°")), **style[n])
+        for n, _ in drawn
+    ]
     handles.append(Line2D([], [], label="the candidate itself", **ITSELF))
     handles.append(Line2D([], [], label="reference certified to", **RESOLVED))
     handles.append(Line2D([], [], linestyle="none", label="° answers at tolerances"))
