@@ -31,7 +31,7 @@ from strainbench.frame import record, record_all, recorded, recorder
 from strainbench.machine import describe_machine, fixed_threads
 from strainbench.plan import never_warm, plan, plan_one, plan_scene
 from strainbench.problem import Problem
-from strainbench.records import RecordsError
+from strainbench.records import DiskError, RecordsError
 from strainbench.reference import REFERENCE_SOLVER
 from strainbench.runner import Observer, Runner, Settings, Summary
 
@@ -529,7 +529,7 @@ def _print_summary(summary: Summary, planned: int, results: Path) -> None:
 
 
 def main() -> None:
-    """Run the command line; exit 2 with one line for a wrong word, 130 when interrupted."""
+    """Run the command line; one line and exit 2 for a wrong word, 1 for the disk; 130 on Ctrl-C."""
     try:
         status = app(standalone_mode=False)
     except typer.TyperException as error:
@@ -538,7 +538,7 @@ def main() -> None:
         sys.exit(2)
     except (ValueError, RecordsError) as error:
         errors.print(f"strainbench: {error}", markup=False)
-        sys.exit(2)
+        sys.exit(1 if isinstance(error, DiskError) else 2)
     if status == INTERRUPTED:  # typer has turned KeyboardInterrupt into it
         errors.print("strainbench: interrupted; every finished cell is kept, run again to resume")
     sys.exit(status or 0)

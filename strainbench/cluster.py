@@ -17,16 +17,15 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from strainbench.cell import Cell
+from strainbench.folder import locked
 from strainbench.records import (
-    RUN_COLUMNS,
-    RUNS,
     STEP_COLUMNS,
     STEPS,
-    append_rows,
     latest_runs,
     read_machines,
     read_rows,
     remember_machine,
+    write_cell,
 )
 from strainbench.runner import Observer, Runner, Settings
 
@@ -60,7 +59,7 @@ def run_on_cluster(
         client = Client(address, timeout="10s")
     except (OSError, ValueError) as error:
         raise ValueError(f"--scheduler {address}: nothing answers there ({error})") from None
-    with client:
+    with locked(settings.folder), client:
         executor = client.get_executor(retries=0)
         futures: dict[Future[Results], Cell] = {
             executor.submit(run_elsewhere, cell, settings): cell for cell in wanted
@@ -69,8 +68,7 @@ def run_on_cluster(
             rows, steps, machines = future.result()
             for name, facts in machines.items():
                 remember_machine(settings.folder, name, facts)
-            append_rows(settings.folder / STEPS, STEP_COLUMNS, steps)
-            append_rows(settings.folder / RUNS, RUN_COLUMNS, rows)
+            write_cell(settings.folder, rows[0], steps)
             observer.ended(futures[future], dict(rows[0]))
     return len(wanted)
 

@@ -18,6 +18,7 @@ from pebble import ProcessPool
 
 from strainbench.cell import Cell
 from strainbench.export import write_problem
+from strainbench.folder import locked
 from strainbench.isolation import Running
 from strainbench.limits import FloatArray
 from strainbench.machine import describe_machine, fixed_threads
@@ -25,10 +26,10 @@ from strainbench.play import read_events, read_frames
 from strainbench.problem import Problem
 from strainbench.records import (
     RecordsError,
-    append_rows,
     open_folder,
     read_rows,
     remember_machine,
+    write_rows,
 )
 from strainbench.referee import certify
 from strainbench.reference import content_key, reference_of
@@ -106,9 +107,16 @@ def converge(
     Raises
     ------
     RecordsError
-        If the folder cannot be written to, or holds another frame.
+        If the folder cannot be written to, is in use, or holds another frame.
     """
     open_folder(folder)
+    with locked(folder):
+        yield from _converge(cells, problem, number, folder, memory_limit_mb)
+
+
+def _converge(
+    cells: Sequence[Cell], problem: Problem, number: int, folder: Path, memory_limit_mb: float
+) -> Iterator[tuple[Cell, str]]:
     check_folder(folder, problem)
     machine, about = describe_machine(threads=1)
     remember_machine(folder, machine, about)
@@ -145,10 +153,7 @@ def keep(folder: Path, rows: Rows) -> None:
     """Write down a solver's rows in place of those that it had."""
     path = folder / CONVERGENCE
     others = [r for r in read_rows(path, COLUMNS) if r["solver"] != rows[0]["solver"]]
-    part = path.with_suffix(".part")
-    part.unlink(missing_ok=True)
-    append_rows(part, COLUMNS, [*others, *rows])
-    part.replace(path)
+    write_rows(path, COLUMNS, [*others, *rows])
 
 
 def run_alone(cell: Cell, folder: Path, frame: Path, memory_limit_mb: float) -> Running:

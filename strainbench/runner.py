@@ -22,21 +22,12 @@ from typing import Any
 from pebble import ProcessPool
 
 from strainbench.cell import Cell
+from strainbench.folder import locked, uninterrupted
 from strainbench.frame import recorder
 from strainbench.isolation import Running
 from strainbench.judge import identity, judge
 from strainbench.machine import describe_machine, fixed_threads
-from strainbench.records import (
-    RUN_COLUMNS,
-    RUNS,
-    STEP_COLUMNS,
-    STEPS,
-    append_rows,
-    latest_runs,
-    open_folder,
-    read_rows,
-    remember_machine,
-)
+from strainbench.records import latest_runs, mend, open_folder, remember_machine, write_cell
 from strainbench.reference import REFERENCE_SOLVER
 
 POLL_SECONDS = 0.02
@@ -105,7 +96,7 @@ class Runner:
     Raises
     ------
     RecordsError
-        If the folder cannot be written to, or holds damaged records.
+        If the folder cannot be written to, is in use, or holds damaged records.
     """
 
     def __init__(self, settings: Settings, observer: Observer | None = None) -> None:
@@ -114,10 +105,15 @@ class Runner:
         self.summary = Summary(settings.jobs)
         folder = settings.folder
         open_folder(folder)
-        read_rows(folder / STEPS, STEP_COLUMNS)
-        self._finished = latest_runs(folder)
+        with locked(folder):
+            self._take_stock()
         self._scratch = folder / "running"
         self._machine = ""
+
+    def _take_stock(self) -> None:
+        """Mend what a dead run left, and see what has finished."""
+        mend(self.settings.folder)
+        self._finished = latest_runs(self.settings.folder)
 
     def is_finished(self, cell: Cell) -> bool:
         """Whether a row makes running `cell` needless.
@@ -134,6 +130,11 @@ class Runner:
 
     def run(self, cells: Sequence[Cell]) -> Summary:
         """Run what is not finished; KeyboardInterrupt passes through, with all results kept."""
+        with locked(self.settings.folder):
+            self._take_stock()
+            return self._run(cells)
+
+    def _run(self, cells: Sequence[Cell]) -> Summary:
         begin = time.perf_counter()
         wanted = [cell for cell in cells if not self.is_finished(cell)]
         self._machine, facts = describe_machine(self.settings.threads)
@@ -231,8 +232,7 @@ class Runner:
         """Append a cell's rows and tell the observer."""
         row["finished_at"] = datetime.now(UTC).isoformat(timespec="seconds")
         row["machine"] = self._machine
-        append_rows(self.settings.folder / STEPS, STEP_COLUMNS, steps)
-        append_rows(self.settings.folder / RUNS, RUN_COLUMNS, [row])
+        write_cell(self.settings.folder, row, steps)
         self.summary.cells += 1
         self.observer.ended(cell, row)
 
@@ -257,8 +257,9 @@ class Court:
     def advance(self, may_open: bool) -> None:
         """Write down the open case if it is decided; open the next one if that is allowed."""
         if self._open and self._open[1].done():
-            self._settle(*self._open)
-            self._open = None
+            with uninterrupted():  # a case is settled once
+                decided, self._open = self._open, None
+                self._settle(*decided)
         if self._waiting and self._open is None and may_open:
             item = self._waiting.popleft()
             folder = self._runner.settings.folder

@@ -7,31 +7,13 @@ from pathlib import Path
 import pandas as pd
 
 from strainbench import escape
-from strainbench.records import RecordsError, latest_runs, read_machines
+from strainbench.records import WORDS, RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_markdown
 from strainbench.report.failures import failures, failures_markdown
 from strainbench.report.page import write_page
 from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_markdown
 from strainbench.report.table import as_latex, as_markdown, describe, tidy
-
-WORDS = {
-    *(
-        "cell",
-        "finished_at",
-        "scenario",
-        "directions",  # a number, or exact
-        "integrator",
-        "solver",
-        "mode",
-        "outcome",
-        "reason",
-        "details_mean",
-        "needs",
-    ),
-    *("scenario_parameters", "solver_parameters", "machine"),
-}
-"""Columns of runs.csv that are not numbers."""
 
 
 def load_runs(folder: Path) -> pd.DataFrame:

@@ -14,13 +14,11 @@ from matplotlib.lines import Line2D
 
 from strainbench import escape
 from strainbench.converge import CANDIDATE, COLUMNS, CONVERGENCE
-from strainbench.records import RecordsError, read_machines, read_rows
+from strainbench.records import WORDS, RecordsError, read_machines, read_rows
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
 from strainbench.report.table import machine_line, power
 
 LEVELS = (1e-2, 1e-4, 1e-6)
-WORDS = ("problem", "scenario", "solver", "sampled_by", "status", "ending", "machine")
-"""Columns of convergence.csv that are not numbers."""
 PANELS = (
     ("max_violation", "largest violation", 1e-10),
     ("relative_gap", "relative gap", 1e-12),

@@ -9,7 +9,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from strainbench import escape
-from strainbench.records import STEP_COLUMNS, STEPS, read_rows
+from strainbench.records import STEP_COLUMNS, latest_steps
 from strainbench.report.chart import COLOURS, save
 from strainbench.report.table import UNCONSTRAINED
 
@@ -37,7 +37,7 @@ def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     Columns: cell, panel and curve (what tells its panel and its curve from others), time [s],
     energy [J].
     """
-    steps = pd.DataFrame(read_rows(folder / STEPS, STEP_COLUMNS), columns=list(STEP_COLUMNS))
+    steps = pd.DataFrame(latest_steps(folder), columns=list(STEP_COLUMNS))
     for column in ("step", "time", *PARTS):
         steps[column] = pd.to_numeric(steps[column].replace("nan", ""))
     steps = steps.dropna(subset=["time", "kinetic_energy"]).drop_duplicates(

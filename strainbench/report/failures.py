@@ -16,7 +16,7 @@ import pandas as pd
 
 from strainbench import escape
 from strainbench.discovery import find_scenario
-from strainbench.records import STEP_COLUMNS, STEPS, read_rows
+from strainbench.records import latest_steps
 from strainbench.referee import OUTCOMES
 from strainbench.report.table import UNCONSTRAINED, machine_line, power
 
@@ -77,7 +77,7 @@ def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
 
 def _statuses(folder: Path) -> dict[tuple[str, str], str]:
     """What the solver says of a cell's projections of each outcome."""
-    latest = {(r["cell"], r["projection"]): r for r in read_rows(folder / STEPS, STEP_COLUMNS)}
+    latest = {(r["cell"], r["projection"]): r for r in latest_steps(folder)}
     found: dict[tuple[str, str], set[str]] = {}
     for row in latest.values():
         found.setdefault((row["cell"], row["outcome"]), set()).add(row["status"])
