@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -49,6 +50,7 @@ DEFAULT_CONVERGENCE = Path("results/local/convergence")
 DEFAULT_DUEL = Path("results/local/duel")
 DEFAULT_STEPS = 10
 INTERRUPTED = 130  # exit status after Ctrl-C
+TERMINATED = 128 + signal.SIGTERM  # and after a polite kill
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
@@ -318,7 +320,7 @@ def converge_(
     results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_CONVERGENCE,
 ) -> None:
     """Follow solvers on one projection of a scene: violation, gap and distance against time."""
-    from strainbench.converge import converge  # pebble and the referee only where needed
+    from strainbench.converge import converge  # the referee only where needed
     from strainbench.report.convergence import write_convergence
 
     cells = plan_scene(scenario, solver or ["all"], set_ or [], 1, tolerance, time_limit)
@@ -510,6 +512,10 @@ class Display(Observer):
         console.print(f"{cell.title}: {time}, {row['outcome']}{reason}", highlight=False)
         self._show()
 
+    def waiting(self, what: str) -> None:
+        """See the base class."""
+        console.print(f"waiting for {what}", highlight=False, markup=False)
+
     def _show(self) -> None:
         completed = self.done + sum(self.running.values())
         what = " | ".join(self.running) or "the referee"
@@ -529,10 +535,19 @@ def _print_summary(summary: Summary, planned: int, results: Path) -> None:
     console.print(f"results in {results}", highlight=False)
 
 
+def _terminate(*_: object) -> None:
+    """End like Ctrl-C, once."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise SystemExit(TERMINATED)
+
+
 def main() -> None:
-    """Run the command line; exit 2 with one line for a wrong word, 130 when interrupted."""
+    """Run the command line; exit 2 with one line for a wrong word, 130 or 143 when interrupted."""
+    signal.signal(signal.SIGTERM, _terminate)
     try:
         status = app(standalone_mode=False)
+    except SystemExit as end:
+        status = end.code
     except typer.TyperException as error:
         message = getattr(error, "format_message", error.__str__)()
         errors.print(f"strainbench: {message} (strainbench --help lists what is valid)")
@@ -540,6 +555,6 @@ def main() -> None:
     except (ValueError, RecordsError) as error:
         errors.print(f"strainbench: {error}", markup=False)
         sys.exit(2)
-    if status == INTERRUPTED:  # typer has turned KeyboardInterrupt into it
+    if status in (INTERRUPTED, TERMINATED):  # typer has turned KeyboardInterrupt into the former
         errors.print("strainbench: interrupted; every finished cell is kept, run again to resume")
     sys.exit(status or 0)

@@ -10,7 +10,6 @@ All runs together have the cell's time limit.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +17,7 @@ import numpy as np
 from strainbench.cell import Cell
 from strainbench.export import load_problem
 from strainbench.limits import FloatArray
-from strainbench.play import Journal, Stop, wait_for_go, with_journal
+from strainbench.play import Journal, Stop, start_warming, wait_for_go, what_it_says, with_journal
 from strainbench.problem import Problem
 from strainbench.solver import Solution, Watch, run_solver, warm_up
 
@@ -37,17 +36,18 @@ def trace(cell: Cell, folder: Path, frame: Path | None) -> None:
 
 def _trace(cell: Cell, folder: Path, journal: Journal, problem: Problem) -> None:
     solver = cell.solver.solver()
+    start_warming(journal)
     if refusal := solver.supports(problem):
         raise Stop(f"unsupported: {refusal}")
     warm_up(solver, problem, cell.tolerance)
     wait_for_go(folder, journal)
-    begin = time.perf_counter()
+    begin = journal.clock()
     state = solver.prepare(problem)
-    journal.write("setup", seconds=time.perf_counter() - begin)
+    journal.write("setup", seconds=journal.clock() - begin)
 
     def run(tolerance: float, watch: Watch) -> Solution:
         limit = cell.time_limit
-        remaining = None if limit is None else limit - (time.perf_counter() - begin)
+        remaining = None if limit is None else limit - (journal.clock() - begin)
         if remaining is not None and remaining <= 0:
             raise Stop(f"time limit of {limit:g} s")
         return run_solver(solver, problem, state, tolerance, remaining, watch)
@@ -86,8 +86,10 @@ class Keeper:
 
     def answer(self, solution: Solution) -> None:
         """What the run came back with."""
-        s = solution
-        self._write("answer", s.seconds, s.iterations, s.positions, str(s.status))
+        said = what_it_says(solution)
+        self._write(
+            "answer", solution.seconds, said["iterations"], solution.positions, said["status"]
+        )
 
     def _write(
         self, event: str, seconds: float, iterations: int, positions: FloatArray, status: str
