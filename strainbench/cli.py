@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -48,6 +49,7 @@ DEFAULT_PICTURES = Path("results/local/pictures")
 DEFAULT_CONVERGENCE = Path("results/local/convergence")
 DEFAULT_DUEL = Path("results/local/duel")
 INTERRUPTED = 130  # exit status after Ctrl-C
+TERMINATED = 128 + signal.SIGTERM  # and after a polite kill
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
 
 
@@ -139,7 +141,7 @@ def run(
         left_out = f"left out, as they cannot start warm: {', '.join(cold)}"
         console.print(left_out, highlight=False, markup=False, soft_wrap=True)
     memory = memory_limit or 0.75 * psutil.virtual_memory().total / 1024**2 / jobs
-    settings = Settings(results, jobs, threads, memory, rerun)
+    settings = Settings(results, jobs, memory, rerun)
     with Display() as display:
         if scheduler:
             from strainbench.cluster import run_on_cluster  # dask only where it is asked for
@@ -317,7 +319,7 @@ def converge_(
     results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_CONVERGENCE,
 ) -> None:
     """Follow solvers on one projection of a scene: violation, gap and distance against time."""
-    from strainbench.converge import converge  # pebble and the referee only where needed
+    from strainbench.converge import converge  # the referee only where needed
     from strainbench.report.convergence import write_convergence
 
     cells = plan_scene(scenario, solver or ["all"], set_ or [], 1, tolerance, time_limit)
@@ -509,6 +511,10 @@ class Display(Observer):
         console.print(f"{cell.title}: {time}, {row['outcome']}{reason}", highlight=False)
         self._show()
 
+    def waiting(self, what: str) -> None:
+        """See the base class."""
+        console.print(f"waiting for {what}", highlight=False, markup=False)
+
     def _show(self) -> None:
         completed = self.done + sum(self.running.values())
         what = " | ".join(self.running) or "the referee"
@@ -528,10 +534,19 @@ def _print_summary(summary: Summary, planned: int, results: Path) -> None:
     console.print(f"results in {results}", highlight=False)
 
 
+def _terminate(*_: object) -> None:
+    """End like Ctrl-C, once."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise SystemExit(TERMINATED)
+
+
 def main() -> None:
     """Run the command line; one line and exit 2 for a wrong word, 1 for the disk; 130 on Ctrl-C."""
+    signal.signal(signal.SIGTERM, _terminate)
     try:
         status = app(standalone_mode=False)
+    except SystemExit as end:
+        status = end.code
     except typer.TyperException as error:
         message = getattr(error, "format_message", error.__str__)()
         errors.print(f"strainbench: {message} (strainbench --help lists what is valid)")
@@ -539,6 +554,6 @@ def main() -> None:
     except (ValueError, RecordsError) as error:
         errors.print(f"strainbench: {error}", markup=False)
         sys.exit(1 if isinstance(error, DiskError) else 2)
-    if status == INTERRUPTED:  # typer has turned KeyboardInterrupt into it
+    if status in (INTERRUPTED, TERMINATED):  # typer has turned KeyboardInterrupt into the former
         errors.print("strainbench: interrupted; every finished cell is kept, run again to resume")
     sys.exit(status or 0)

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
-
-from pebble import ProcessPool
 
 from strainbench.cell import Cell
 from strainbench.export import write_problem
@@ -24,6 +21,7 @@ from strainbench.limits import FloatArray
 from strainbench.machine import describe_machine, fixed_threads
 from strainbench.play import read_events, read_frames
 from strainbench.problem import Problem
+from strainbench.process import family
 from strainbench.records import (
     RecordsError,
     open_folder,
@@ -158,15 +156,12 @@ def keep(folder: Path, rows: Rows) -> None:
 
 def run_alone(cell: Cell, folder: Path, frame: Path, memory_limit_mb: float) -> Running:
     """Run a cell in a process of its own, to its end."""
-    with ProcessPool(1, max_tasks=1, context=get_context("spawn")) as pool:
-        try:
-            item = Running.start(pool, cell, folder, frame, memory_limit_mb, trace)
-            while not item.has_ended():
-                if item.is_ready():
-                    item.release()
-                time.sleep(POLL_SECONDS)
-        finally:
-            pool.stop()
+    with family() as ours:
+        item = Running.start(ours, cell, folder, frame, memory_limit_mb, trace)
+        while not item.has_ended():
+            if item.is_ready():
+                item.release()
+            time.sleep(POLL_SECONDS)
     return item
 
 

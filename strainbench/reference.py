@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +28,7 @@ LOCAL_TOLERANCE = 1e-6
 ATTEMPTS = 4  # each but the first with bounds tightened further, by three times the violation
 MARGIN = 3e-13  # of the first attempt, above what the reference solver leaves of violation
 ACTIVE = 1e-6  # constraints this close to their bound count as active
+Kept = dict[str, tuple[FloatArray, FloatArray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,31 +105,25 @@ class ReferenceSolver:
     Parameters
     ----------
     problem : any frame; its matrices are prepared once
-    cache : a folder in which references are kept by content, or None
+    kept : positions and multipliers by content, read and added to; no file, which a cell's
+        solver could read its answers from
     """
 
-    def __init__(self, problem: Problem, cache: Path | None = None) -> None:
+    def __init__(self, problem: Problem, kept: Kept | None = None) -> None:
         self._solver = _reference_solver(problem)
         self._state: Any = None
         self._prepared = False
         self._problem = problem
-        self._cache = cache
+        self._kept = {} if kept is None else kept
 
     def __call__(self, problem: Problem) -> Reference:
         """The reference of a frame of this mesh."""
         if not np.any(problem.violations(problem.target)):
             return verify(problem, problem.target, np.zeros((problem.rows, 3)))
-        file = self._cache and self._cache / f"{content_key(problem)}.npz"
-        if file and file.exists():
-            with np.load(file) as data:
-                return verify(problem, data["positions"], data["multipliers"])
-        positions, multipliers = self._solve(problem)
-        if file:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            part = file.with_suffix(".part.npz")
-            np.savez(part, positions=positions, multipliers=multipliers)
-            part.replace(file)
-        return verify(problem, positions, multipliers)
+        key = content_key(problem)
+        if key not in self._kept:
+            self._kept[key] = self._solve(problem)
+        return verify(problem, *self._kept[key])
 
     def _solve(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
         if self._solver is None:

@@ -45,19 +45,24 @@ class Solution:
 
 
 class Clock:
-    """Solve time, which stands still while a monitor looks at an iterate."""
+    """Solve time, which stands still while a monitor looks at an iterate.
+
+    Attributes
+    ----------
+    paused : seconds that monitors took
+    """
 
     def __init__(self, time_limit: float | None = None, watch: Watch | None = None) -> None:
         self._limit = float("inf") if time_limit is None else time_limit
         self._watch = watch
         self._iterations = 0
-        self._paused = 0.0
+        self.paused = 0.0
         self._start = perf_counter()
 
     @property
     def elapsed(self) -> float:
         """Seconds on the clock."""
-        return perf_counter() - self._start - self._paused
+        return perf_counter() - self._start - self.paused
 
     @property
     def remaining(self) -> float:
@@ -85,9 +90,9 @@ class Clock:
             return
         start = perf_counter()
         self._iterations = self._iterations + 1 if iterations is None else iterations
-        seconds = start - self._start - self._paused
+        seconds = start - self._start - self.paused
         self._watch(seconds, self._iterations, positions, multipliers)
-        self._paused += perf_counter() - start
+        self.paused += perf_counter() - start
 
 
 @dataclass(frozen=True)
@@ -182,8 +187,11 @@ def run_solver(
     tolerance: float,
     time_limit: float | None = None,
     watch: Watch | None = None,
+    now: Callable[[], float] = perf_counter,
 ) -> Solution:
     """One timed projection with a prepared solver.
+
+    `now` is bound here, out of the way of a plug-in that replaces this module's clock.
 
     Raises
     ------
@@ -191,13 +199,15 @@ def run_solver(
         If the solver returns anything but a Solution.
     """
     clock = Clock(time_limit, watch)
+    begin = now()
     solution = solver.solve(
         problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
     )
-    seconds = clock.elapsed
+    seconds = now() - begin - (clock.paused if watch else 0.0)
     if not isinstance(solution, Solution):
         raise TypeError(f"{solver.name} returned {type(solution).__name__}, not a Solution")
-    return replace(solution, seconds=seconds)
+    s = solution  # perhaps of a class with a mind of its own
+    return Solution(s.positions, s.status, s.iterations, s.multipliers, s.details, seconds)
 
 
 def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:

@@ -12,7 +12,6 @@ at its tolerance, only where the solver was when it had to stop.
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,7 @@ import numpy as np
 from strainbench.cell import Cell
 from strainbench.export import load_problem
 from strainbench.limits import FloatArray
-from strainbench.play import Journal, Stop, wait_for_go, with_journal
+from strainbench.play import Journal, Stop, start_warming, wait_for_go, what_it_says, with_journal
 from strainbench.problem import Problem
 from strainbench.solver import Solution, run_solver, warm_up
 
@@ -40,17 +39,18 @@ def trace(cell: Cell, folder: Path, frame: Path | None) -> None:
 
 def _trace(cell: Cell, folder: Path, journal: Journal, problem: Problem) -> None:
     solver = cell.solver.solver()
+    start_warming(journal)
     if refusal := solver.supports(problem):
         raise Stop(f"unsupported: {refusal}")
     warm_up(solver, problem, cell.tolerance)
     wait_for_go(folder, journal)
-    begin = time.perf_counter()
+    begin = journal.clock()
     state = solver.prepare(problem)
-    journal.write("setup", seconds=time.perf_counter() - begin)
+    journal.write("setup", seconds=journal.clock() - begin)
 
     limit = np.inf if cell.time_limit is None else cell.time_limit
     over = Stop(f"time limit of {limit:g} s")
-    left = limit - (time.perf_counter() - begin)
+    left = limit - (journal.clock() - begin)
     looser = tolerances(cell.tolerance)
     while looser:
         if left <= 0:
@@ -61,7 +61,7 @@ def _trace(cell: Cell, folder: Path, journal: Journal, problem: Problem) -> None
         if solution.seconds >= left:
             raise over
         keeper.answer(solution)
-        left = limit - (time.perf_counter() - begin)
+        left = limit - (journal.clock() - begin)
         if keeper.has_iterates or left < SHORT * solution.seconds:
             del looser[:-1]  # 2
 
@@ -92,8 +92,10 @@ class Keeper:
 
     def answer(self, solution: Solution) -> None:
         """What the run came back with."""
-        s = solution
-        self._write("answer", s.seconds, s.iterations, s.positions, str(s.status))
+        said = what_it_says(solution)
+        self._write(
+            "answer", solution.seconds, said["iterations"], solution.positions, said["status"]
+        )
 
     def _write(
         self, event: str, seconds: float, iterations: int, positions: FloatArray, status: str
