@@ -137,7 +137,7 @@ class Steps:
         self.h, self.s = 1.0, 1.0
         if method.settings == "tuned":
             self.h = problem.edge_length
-            self.s = 4 / (self.h**2 * float(problem.weights.mean()))
+            self.s = 4 / (self.h**2 * problem.mean_weight)
         self.G = self.h * G
         self.M = sp.diags_array(self.s * self.h**2 * np.repeat(problem.weights[problem.free], 3))
         self.stretched = problem.G @ problem.target

@@ -175,6 +175,13 @@ def warm_twin(solver: Solver) -> Solver:
     return replace(solver, warm=True)  # type: ignore[call-arg]
 
 
+def check_threads(threads: int) -> None:
+    """ValueError for anything but a number of threads."""
+    whole = isinstance(threads, (int, np.integer)) and not isinstance(threads, bool)
+    if not whole or threads < 1:
+        raise ValueError(f"threads is {threads!r}: a whole number of at least 1 is valid")
+
+
 def run_solver(
     solver: Solver,
     problem: Problem,
@@ -191,9 +198,15 @@ def run_solver(
         If the solver returns anything but a Solution.
     """
     clock = Clock(time_limit, watch)
-    solution = solver.solve(
-        problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
-    )
+    try:
+        solution = solver.solve(
+            problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
+        )
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # of pyo3, which shows no class to import
+            raise
+        words = " ".join(str(error).split())
+        solution = Solution(np.full_like(problem.target, np.nan), f"panic: {words}", 0)
     seconds = clock.elapsed
     if not isinstance(solution, Solution):
         raise TypeError(f"{solver.name} returned {type(solution).__name__}, not a Solution")
