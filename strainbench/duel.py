@@ -187,7 +187,7 @@ class Factorisation:
     """The unit that one numeric factorisation and one solve of a mesh's matrix make."""
 
     def __init__(self, problem: Problem) -> None:
-        pattern = Pattern.of([problem.elements], problem.vertices, problem.pinned)
+        pattern = Pattern.of([problem.elements], problem.vertices, problem.held)
         matrix = pattern.matrix()
         self._linear = best_linear_solver(matrix)
         self._data = np.ones(len(pattern.indices))

@@ -180,6 +180,13 @@ def warm_twin(solver: Solver) -> Solver:
     return replace(solver, warm=True)  # type: ignore[call-arg]
 
 
+def check_threads(threads: int) -> None:
+    """ValueError for anything but a number of threads."""
+    whole = isinstance(threads, (int, np.integer)) and not isinstance(threads, bool)
+    if not whole or threads < 1:
+        raise ValueError(f"threads is {threads!r}: a whole number of at least 1 is valid")
+
+
 def run_solver(
     solver: Solver,
     problem: Problem,
@@ -200,14 +207,27 @@ def run_solver(
     """
     clock = Clock(time_limit, watch)
     begin = now()
-    solution = solver.solve(
-        problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
-    )
+    try:
+        solution = solver.solve(
+            problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
+        )
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # of pyo3, which shows no class to import
+            raise
+        words = " ".join(str(error).split())
+        solution = Solution(np.full_like(problem.target, np.nan), f"panic: {words}", 0)
     seconds = now() - begin - (clock.paused if watch else 0.0)
     if not isinstance(solution, Solution):
         raise TypeError(f"{solver.name} returned {type(solution).__name__}, not a Solution")
     s = solution  # perhaps of a class with a mind of its own
     return Solution(s.positions, s.status, s.iterations, s.multipliers, s.details, seconds)
+
+
+def held_still(problem: Problem, tolerance: float) -> Solution:
+    """The answer where no vertex is free: the target, if it is within the limits."""
+    within = problem.violations(problem.target).max() <= tolerance
+    status = "solved" if within else "infeasible"
+    return Solution(problem.target.copy(), status, 0, np.zeros((problem.rows, 3)))
 
 
 def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:

@@ -32,6 +32,7 @@ from solvers.admm.rows import Rows
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
 from strainbench.reference import objective_floor
+from strainbench.solver import held_still
 from strainbench.warm import Memory
 
 LOOK = 10
@@ -108,7 +109,9 @@ class Admm(Solver):
         deadline: Clock,
     ) -> Solution:
         """Iterations from the target with no multipliers, or from the last answer."""
-        if not np.any(problem.violations(problem.target)) or len(problem.free) == 0:
+        if len(problem.free) == 0:
+            return held_still(problem, tolerance)
+        if not np.any(problem.violations(problem.target)):
             nothing = np.zeros((problem.rows, 3))
             return state.keep(problem, Solution(problem.target.copy(), "solved", 0, nothing))
         iteration = Iteration(self, problem, state.mesh, *state.start(problem))

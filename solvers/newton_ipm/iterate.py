@@ -30,7 +30,7 @@ class State:
     """What a mesh needs once, and the last frame's centred iterate."""
 
     def __init__(self, problem: Problem) -> None:
-        self.pattern = Pattern.of([problem.elements], problem.vertices, problem.pinned)
+        self.pattern = Pattern.of([problem.elements], problem.vertices, problem.held)
         self.linear = best_linear_solver(self.pattern.matrix())
         kind = ExactCones if problem.limits.spectral else SampledCones
         self.cones: SampledCones | ExactCones = kind(problem, self.pattern)
@@ -69,7 +69,7 @@ class Iterate:
     def start(self) -> None:
         """From the target, with products of a guess: the violation over the size of the mesh."""
         problem = self.problem
-        size = problem.edge_length * np.sqrt(problem.vertices)
+        size = problem.edge_length * np.sqrt(len(problem.used))
         far = size * np.sqrt(np.mean(self.violations**2))
         guess = 0.5 * far**2 * float(np.sum(problem.weights[self.free]))
         self.x = self.target
@@ -81,6 +81,7 @@ class Iterate:
         assert self.state.snapshot is not None
         x, s, l, target = self.state.snapshot  # noqa: E741
         self.x = x + (self.target - target)
+        self.x[self.problem.held] = self.target[self.problem.held]
         self.cones.place(self.problem.bounds, self.x)
         self.cones.resume(s, l)
 
