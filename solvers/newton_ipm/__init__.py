@@ -17,7 +17,10 @@ products s l, a Newton step that is to change the products by c solves
    dual bound exceeds the objective of any point within the limits: there is none.
 3. Factorise K. Predictor: c = -s l.
 4. Corrector: c = sigma mu - s l - ds dl and r less |dy|^2/2, of the predictor's step, where
-   sigma = (products after the predictor / products)^6.
+   sigma = (products after the predictor / products)^6, but no smaller than what the tolerance
+   asks for, nor than 1e-4 of the whole error. With masses over many decades the products would
+   run ahead of the residuals of light vertices, which count for nothing in the objective, until
+   slacks are lost in rounding.
 5. Gondzio's correctors: what moves the products of a longer step into [0.1, 5] sigma mu, kept
    while the step grows.
 6. One step length for all, 0.99 of the way to the boundary.
@@ -135,6 +138,8 @@ no factor any more; the best iterate is returned |
         if other.status == "solved":
             return replace(other, iterations=found.iterations + other.iterations)
         violation = float(problem.violations(found.positions).max())
+        if violation == 0:
+            return found
         rough = partial(roughly, state=state, deadline=deadline)
         shown = infeasible_multipliers(problem, violation, tolerance, rough)  # 8
         return found if shown is None else Solution(nowhere, "infeasible", found.iterations, shown)
@@ -149,7 +154,7 @@ no factor any more; the best iterate is returned |
         deadline: Clock,
     ) -> tuple[Solution, float]:
         """Steps 2 to 6; and the least error, which is the solution's."""
-        iterate = Iterate(problem, state, keep=warm)
+        iterate = Iterate(problem, state, warm, tolerance)
         warm = resumed = warm and state.snapshot is not None
         if warm:
             iterate.resume()
@@ -195,7 +200,7 @@ def roughly(
 
     An error of 1 is a gap of ROUGH, or a violation by the part ROUGH of `width`.
     """
-    iterate = Iterate(problem, state, keep=False)
+    iterate = Iterate(problem, state, False, ROUGH)
     iterate.start()
     for _ in range(ROUGH_ITERATIONS):
         iterate.measure()

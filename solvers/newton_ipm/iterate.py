@@ -17,6 +17,7 @@ FLOOR = 3e-3  # least first slack, in b^2
 FIRST_MU = 50.0  # times the guess of the optimum's objective
 EXPONENT = 6  # of sigma
 LEAST_SIGMA = 1e-4
+AIM = 0.1  # part of the tolerance
 CORRECTORS = 2
 LONGER, GROWTH = 0.3, 0.1  # a corrector aims at this longer a step, and must bring this part of it
 LOW, HIGH = 0.1, 5.0  # products aimed at by correctors, in sigma mu
@@ -56,7 +57,8 @@ class Iterate:
     infeasible : whether the dual bound shows that no positions meet the limits
     """
 
-    def __init__(self, problem: Problem, state: State, keep: bool) -> None:
+    def __init__(self, problem: Problem, state: State, keep: bool, tolerance: float) -> None:
+        self.tolerance = tolerance
         self.problem, self.state, self.cones = problem, state, state.cones
         self.keep = keep
         self.target, self.weights = problem.target, problem.weights[:, None]
@@ -91,14 +93,14 @@ class Iterate:
         pull = cones.back(self.Y)
         self.r_d = self.weights * (self.x - self.target) + pull
         excess = cones.excess()
-        objective = self.problem.objective(self.x)
+        self.objective = objective = self.problem.objective(self.x)
         most = float(cones.b @ norms)
         linear = float(np.sum(self.Y * self.y_target)) - most * (1 + ROUNDING)
         square = float(np.sum(pull[free] ** 2 / self.weights[free]))
         bound = 0.5 * linear**2 / square if linear > 0 < square else 0.0
         self.infeasible = bound > objective and bound > self.problem.largest_objective
-        priced = objective - bound + float(norms @ np.maximum(excess, 0.0))
-        self.gap = max(0.0, priced) / max(bound, self.floor)
+        self.priced = objective - bound + float(norms @ np.maximum(excess, 0.0))
+        self.gap = max(0.0, self.priced) / max(bound, self.floor)
         self.violation = float(np.max(excess))
         return max(STRICTER * self.violation, self.gap)
 
@@ -115,7 +117,9 @@ class Iterate:
             self._snapshot(*self._direction(cones.corrector(mu), r))
         _, affine = self._direction(cones.predictor(), r)
         ratio = cones.products(affine, affine.length) / total
-        mu *= max(ratio**EXPONENT, LEAST_SIGMA)
+        enough = AIM * self.tolerance * max(self.objective, self.floor)
+        least = min(total, max(enough, LEAST_SIGMA * self.priced)) / cones.degree
+        mu = max(mu * max(ratio**EXPONENT, LEAST_SIGMA), least)
         r = r - affine.square
         c = cones.corrector(mu, affine)  # 4
         dx, change = self._direction(c, r)
