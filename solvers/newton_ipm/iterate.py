@@ -6,6 +6,7 @@ import numpy as np
 
 from solvers.newton_ipm.exact import ExactCones
 from solvers.newton_ipm.mesh import Change
+from solvers.newton_ipm.sampled import ROUNDING as LOST
 from solvers.newton_ipm.sampled import SampledCones
 from strainbench import Problem
 from strainbench.limits import FloatArray
@@ -24,6 +25,7 @@ LOW, HIGH = 0.1, 5.0  # products aimed at by correctors, in sigma mu
 BACK_OFF = 0.99
 SNAPSHOT = 0.1  # relative gap
 STRICTER = 100.0  # limits must hold so much better than the gap: they do, but for the last steps
+LARGE = 1e3  # multipliers, of the objective: there may be others that are larger still
 ROUNDING = 32 * np.finfo(float).eps  # of a sum of products, as the referee counts it
 
 
@@ -87,7 +89,7 @@ class Iterate:
         self.cones.resume(s, l)
 
     def measure(self) -> float:
-        """The larger of violation and relative gap at x, the violations priced in."""
+        """The larger of relative gap at x, the violations priced in, and STRICTER violations."""
         cones, free = self.cones, self.free
         self.Y, norms = cones.multipliers()
         pull = cones.back(self.Y)
@@ -99,10 +101,15 @@ class Iterate:
         square = float(np.sum(pull[free] ** 2 / self.weights[free]))
         bound = 0.5 * linear**2 / square if linear > 0 < square else 0.0
         self.infeasible = bound > objective and bound > self.problem.largest_objective
-        self.priced = objective - bound + float(norms @ np.maximum(excess, 0.0))
-        self.gap = max(0.0, self.priced) / max(bound, self.floor)
+        price, scale = float(norms @ np.maximum(excess, 0.0)), max(bound, self.floor)
+        self.priced = objective - bound + price
+        self.gap = max(0.0, self.priced) / scale
         self.violation = float(np.max(excess))
-        return max(STRICTER * self.violation, self.gap)
+        error = max(STRICTER * self.violation, self.gap)
+        if most < LARGE * scale:
+            return error
+        beyond = np.maximum(excess - 2 * LOST, 0.0)
+        return max(error, STRICTER * float(norms @ beyond) / scale)
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
