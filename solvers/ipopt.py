@@ -73,7 +73,10 @@ class Ipopt(Solver):
 
     name = "ipopt"
     takes_lower = True
-    variants = {"default": {"scaling": "default"}}
+    variants = {
+        "default": {"scaling": "default"},
+        "default-lbfgs": {"scaling": "default", "hessian": "limited-memory"},
+    }
 
     scaling: str = "scaled"
     hessian: str = "exact"
