@@ -65,6 +65,7 @@ check: setup ## format, lint, types, tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/mypy examples
 	$(TESTS)
 
 perf: setup ## pytest-benchmark on recorded frames; writes results/local/perf.json
