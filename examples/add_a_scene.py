@@ -17,7 +17,8 @@ from strainbench import solve
 from strainbench.scenario import SheetScenario, StepReport
 
 LENGTH, STEP = 1.0, 1 / 60  # [m], [s]
-Array, Indices = NDArray[np.float64], NDArray[np.int64]
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
