@@ -15,7 +15,7 @@ TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipo
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test quick check perf report clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick check graph perf report clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -65,7 +65,11 @@ check: setup ## format, lint, types, tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/mypy examples
 	$(TESTS)
+
+graph: setup ## the rooms of the code: floors, lines, what imports what, and what does so upwards
+	$(BIN)/python -m tests.imports
 
 perf: setup ## pytest-benchmark on recorded frames; writes results/local/perf.json
 	@mkdir -p $(LOCAL)

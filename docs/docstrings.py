@@ -1,0 +1,47 @@
+"""Docstrings as this project writes them, for Griffe.
+
+A line "tolerance : the largest violation to aim for." under Parameters or Attributes has text where
+numpydoc has a type. Types are in the annotations, so all of it becomes the description. And in formulas
+x* is no emphasis, <Y, x> no HTML.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import griffe
+
+SECTION = re.compile(r"^(Parameters|Attributes)\n-+\n((?:.+\n?|\n(?=[ \w]))*)", re.MULTILINE)
+ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : (.*))?\n?((?:(?:[ ]{4}.*)?\n)*)", re.MULTILINE)
+
+
+FORMULA = re.compile(r"(^[ ]{4}.*|^>>>.*|`[^`]*`)|(?<=[\w)])\*|<(?=[A-Za-z])", re.MULTILINE)
+
+
+def as_numpydoc(text: str) -> str:
+    """A docstring whose entries are a name, and below it everything that is said of it."""
+    escaped = FORMULA.sub(lambda found: found[1] or f"\\{found[0]}", text)
+    return SECTION.sub(lambda found: _section(found[1], found[2]), escaped)
+
+
+def _section(title: str, body: str) -> str:
+    entries = ENTRY.sub(lambda found: _entry(found[1], found[2] or "", found[3]), body + "\n")
+    return f"{title}\n{'-' * len(title)}\n{entries}"
+
+
+def _entry(names: str, first: str, rest: str) -> str:
+    """`first` goes on in `rest`, or is a shape, after which a new sentence begins."""
+    following = rest.strip()
+    stop = ". " if following[:1].isupper() and first[-1:] not in ".;:" else " "
+    said = f"    {first}{stop if first and following else ''}{rest.lstrip()}".rstrip()
+    return "".join(f"{name}\n{said}\n" for name in names.split(", "))
+
+
+class Prose(griffe.Extension):
+    """Reads every docstring so."""
+
+    def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
+        """Called once for each module, class, function and attribute."""
+        if obj.docstring:
+            obj.docstring.value = as_numpydoc(obj.docstring.value)
