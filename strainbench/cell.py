@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from strainbench.discovery import find_scenario, find_solver, load_file
+from strainbench.fields import plain, restored
 from strainbench.scenario import Scenario
 from strainbench.solver import Solver
 
@@ -21,7 +23,7 @@ class PluginRef:
     ----------
     name : its class's name in the suite
     label : with what sets it apart from the defaults
-    parameters : all its fields
+    parameters : all its fields, as JSON has them
     path : of the file that it came from, or None for one of ours
     content : digest of that file, and of files that its parameters name, when the run was
         planned: an edited file is another plug-in
@@ -36,29 +38,35 @@ class PluginRef:
     unavailable: str | None = None
 
     @classmethod
-    def of(cls, plugin: Solver | Scenario, path: str | None = None) -> PluginRef:
+    def of(
+        cls, plugin: Solver | Scenario, path: str | None = None, label: str | None = None
+    ) -> PluginRef:
         """A reference to `plugin`, from the file at `path` unless it is ours."""
-        named = [v for v in plugin.parameters.values() if isinstance(v, str) and Path(v).is_file()]
+        parameters = {name: plain(value) for name, value in plugin.parameters.items()}
+        named = [v for v in parameters.values() if isinstance(v, str) and _is_file(v)]
         files = [*([path] if path else []), *named]
         content = _digest([Path(f).read_bytes().hex() for f in files]) if files else ""
-        return cls(plugin.name, plugin.label, tuple(plugin.parameters.items()), path, content)
+        label = str(plugin.label) if label is None else label
+        return cls(plugin.name, label, tuple(parameters.items()), path, content)
 
     def solver(self) -> Solver:
         """Load it as a solver."""
         if self.path is None:
-            return replace(find_solver(self.name), **self._settings)
-        return next(c for c in load_file(self.path, Solver) if c.name == self.name)(
-            **self._settings
-        )
+            solver = find_solver(self.name)
+        else:
+            solver = next(c for c in load_file(self.path, Solver) if c.name == self.name)()
+        known = [solver.parameters, *solver.variants.values()]
+        return replace(solver, **self._settings(type(solver), known))
 
     def scenario(self) -> Scenario:
         """Load it as a scenario."""
         classes = load_file(self.path, Scenario) if self.path else [find_scenario(self.name)]
-        return next(c for c in classes if c.name == self.name)(**self._settings)
+        scenario = next(c for c in classes if c.name == self.name)()
+        return replace(scenario, **self._settings(type(scenario), [scenario.parameters]))
 
-    @property
-    def _settings(self) -> dict[str, Any]:
-        return dict(self.parameters)
+    def _settings(self, kind: type, known: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        values = {name: [k[name] for k in known if name in k] for name, _ in self.parameters}
+        return restored(kind, dict(self.parameters), values)
 
     @property
     def identity(self) -> list[object]:
@@ -106,6 +114,13 @@ class Cell:
     def title(self) -> str:
         """For the progress bar."""
         return f"{self.scenario.label}, {self.solver.label}"
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except (OSError, ValueError):  # too long for a name, or with a null character
+        return False
 
 
 def _digest(content: object) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from time import perf_counter
 from typing import ClassVar
 
 import numpy as np
 
+from strainbench.fields import same, spelled
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import lumped_areas
 from strainbench.physics.cloth import Cloth, Material
@@ -122,14 +123,17 @@ class Scenario(ABC):
     @property
     def label(self) -> str:
         """Name, resolution and limit, then what else differs from the defaults."""
-        shown = {"resolution", "limit"}
-        changed = {
-            f.name: getattr(self, f.name)
-            for f in fields(self)
-            if f.name not in shown and getattr(self, f.name) != f.default
-        }
-        others = "".join(f", {k}={v}" for k, v in changed.items())
-        return f"{self.name} {self.resolution} at {100 * self.limit:g}%{others}"
+        return self.labelled({})
+
+    def labelled(self, words: Mapping[str, str]) -> str:
+        """The same; what was set in `words` is there as it was spelled, defaults too."""
+        default = type(self)().parameters
+        others = "".join(
+            f", {k}={words.get(k) or spelled(v)}"
+            for k, v in self.parameters.items()
+            if k not in ("resolution", "limit") and (k in words or not same(v, default[k]))
+        )
+        return f"{self.name} {self.resolution} at {100 * self.limit:.12g}%{others}"
 
     def limits(self) -> StretchLimits:
         """The same bound in all directions."""
