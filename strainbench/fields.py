@@ -168,6 +168,8 @@ def _words(kind: Any) -> str:
     origin, entries = get_origin(kind) or kind, get_args(kind)
     if kind is NoneType:
         return "none"
+    if kind is Any:
+        return "value of a type that is not known here"
     if _is(kind, Enum):
         return "one of " + ", ".join(kind.__members__)
     if origin is Literal:
@@ -211,7 +213,7 @@ def spelled(value: Any) -> str:
     value = plain(value)
     if isinstance(value, list):
         return SEPARATOR.join(map(spelled, value))
-    return str(value)
+    return str(value).lower() if value is None or isinstance(value, bool) else str(value)
 
 
 def restored(

@@ -26,6 +26,7 @@ from strainbench.discovery import (
 )
 from strainbench.fields import SETTABLE, NotSettableError, default_of, hints, read
 from strainbench.fields import words as words_of
+from strainbench.options import MOST, shown
 from strainbench.scenario import Scenario
 from strainbench.solver import Solver, warm_twin
 
@@ -49,7 +50,7 @@ def parse_settings(words: Iterable[str]) -> Choices:
         key, equals, values = word.partition("=")
         owner, _, name = key.rpartition(".")
         if not equals or not name or not values:
-            raise ValueError(f"--set {word}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
+            raise ValueError(f"--set {shown(word)}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
         choices.setdefault(owner, {}).setdefault(name, []).extend(values.split(","))
     return choices
 
@@ -227,7 +228,10 @@ def steps_for(scene: PluginRef, duration: float) -> int:
     step = dict(scene.parameters).get("step")
     if not isinstance(step, int | float):
         raise ValueError(f"--duration {duration:g}: no time passes in {scene.name}; give --steps")
-    return max(1, round(duration / step))
+    steps = max(1.0, duration / step)
+    if steps > MOST:
+        raise ValueError(f"--duration {duration:g}: {steps:.3g} steps of {scene.name} are too many")
+    return round(steps)
 
 
 def plan(
@@ -253,7 +257,7 @@ def plan(
         One line that names the wrong word and what is valid.
     """
     if mode not in MODES:
-        raise ValueError(f"--mode {mode}: valid are {', '.join(MODES)}")
+        raise ValueError(f"--mode {shown(mode)}: valid are {', '.join(MODES)}")
     if steps < 1:
         raise ValueError(f"--steps {steps}: a whole number above 0 is valid")
     times = (("--time-limit", [time_limit]), ("--duration", [duration]))
@@ -262,7 +266,7 @@ def plan(
             if value is not None and not 0 < value < float("inf"):
                 raise ValueError(f"{name} {value}: a number above 0 is valid")
     if not starts or not set(starts) <= set(STARTS):
-        raise ValueError(f"--start {','.join(starts)}: valid are cold, warm and cold,warm")
+        raise ValueError(f"--start {shown(','.join(starts))}: valid are cold, warm and cold,warm")
     choices = parse_settings(settings)
     scenes = plan_scenarios(scenarios, choices)
     methods = plan_solvers(solvers, choices, starts)

@@ -193,7 +193,8 @@ class ClothScenario(SheetScenario):
 
     Parameters
     ----------
-    integrator : a key of `strainbench.physics.integrators.INTEGRATORS`.
+    integrator : sap, sar, bap or bar as in the paper, or sar-projected, bar-bdf2 or bar-stable,
+        our variants of them: `strainbench.physics.integrators`.
     step : time step [s].
     norm : "unweighted" as printed in Eq. 5, or "mass".
     """
