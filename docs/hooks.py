@@ -67,7 +67,9 @@ def classes(path: Path) -> Iterator[str]:
     """The classes of a plug-in that are solvers or scenes: those with a name of their own."""
     module = path / "__init__.py" if path.is_dir() else path
     for node in ast.parse(module.read_text()).body:
-        names = [t for n in getattr(node, "body", []) if isinstance(n, ast.Assign) for t in n.targets]
+        names = [
+            t for n in getattr(node, "body", []) if isinstance(n, ast.Assign) for t in n.targets
+        ]
         if isinstance(node, ast.ClassDef) and any(ast.unparse(name) == "name" for name in names):
             yield node.name
 
@@ -75,7 +77,9 @@ def classes(path: Path) -> Iterator[str]:
 def plugin_page(package: str, title: str, path: Path) -> str:
     """What a plug-in's docstrings say."""
     module = f"{package}.{path.stem}"
-    options = "    options: { show_root_heading: false, show_root_toc_entry: false, members: false }"
+    options = (
+        "    options: { show_root_heading: false, show_root_toc_entry: false, members: false }"
+    )
     parts = [f"# {title}\n\n::: {module}\n{options}\n"]
     parts += [f"::: {module}.{name}\n    options: {{ members: false }}\n" for name in classes(path)]
     return "\n".join(parts)
@@ -90,7 +94,11 @@ def example_page(name: str) -> str:
 def face() -> str:
     """What `from strainbench import ...` offers."""
     tree = ast.parse((ROOT / "strainbench/__init__.py").read_text())
-    (names,) = (n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "__all__")
+    (names,) = (
+        n.value
+        for n in tree.body
+        if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "__all__"
+    )
     public = [str(name) for name in ast.literal_eval(names)]
     return "\n".join(f"- [`{name}`][strainbench.{name}]" for name in public)
 
@@ -138,7 +146,11 @@ def on_files(files: Files, config: Any) -> Files:
         files.append(File.generated(config, place, content=text))
     files.append(File.generated(config, "projection.svg", content=projection.draw()))
     kept = subprocess.run(
-        ["git", "ls-files", "results", "LICENSE", "CITATION.cff"], cwd=ROOT, capture_output=True, text=True, check=True
+        ["git", "ls-files", "results", "LICENSE", "CITATION.cff"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     for path in kept.stdout.split():
         files.append(File.generated(config, path, abs_src_path=str(ROOT / path)))
@@ -158,7 +170,11 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
     text = WANTED.sub(section, markdown).replace("{{ the face }}", face())
     source = "results" if here == "results/README.md" else "."
-    return relinked(text, source, here) if here in ("results/README.md", "changelog.md", "security.md") else text
+    return (
+        relinked(text, source, here)
+        if here in ("results/README.md", "changelog.md", "security.md")
+        else text
+    )
 
 
 def on_post_build(**_: Any) -> None:
@@ -175,7 +191,9 @@ def relinked(text: str, folder: str, here: str) -> str:
         address, anchor = found[1], found[2] or ""
         if ":" in address or (not address and folder != "."):
             return found[0]
-        place = page_of(posixpath.normpath(posixpath.join(folder, address)) if address else "README.md", anchor)
+        place = page_of(
+            posixpath.normpath(posixpath.join(folder, address)) if address else "README.md", anchor
+        )
         return posixpath.relpath(place, posixpath.dirname(here) or ".") + anchor
 
     return LINK.sub(link, text)
@@ -200,7 +218,9 @@ def page_of(path: str, anchor: str) -> str:
 
 def _wanted_by() -> dict[str, str]:
     """The page on which each section of the README is."""
-    pages = {path.relative_to(ROOT / "docs").as_posix(): path for path in (ROOT / "docs").rglob("*.md")}
+    pages = {
+        path.relative_to(ROOT / "docs").as_posix(): path for path in (ROOT / "docs").rglob("*.md")
+    }
     return {
         title: place
         for place, path in pages.items()

@@ -27,7 +27,8 @@ class Collision(ClothScenario):
 
     Parameters
     ----------
-    stiffness, margin : of the penalty, see `Contact` [N/m], [m].
+    stiffness : of the penalty, see `Contact` [N/m].
+    margin : the distance at which the penalty begins [m].
     floor : height of a floor [m], or None.
     """
 

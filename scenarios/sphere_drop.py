@@ -28,7 +28,8 @@ class SphereDrop(ClothScenario):
 
     Parameters
     ----------
-    stiffness, margin : of the penalty, see `Contact` [N/m], [m].
+    stiffness : of the penalty, see `Contact` [N/m].
+    margin : the distance at which the penalty begins [m].
     """
 
     name = "sphere-drop"

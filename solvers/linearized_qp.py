@@ -67,6 +67,7 @@ class LinearizedQP(Solver):
         at 10 and 20 cells, 1% and 0.1%: three times as fast as OSQP at 1e-7 with the rest default.
     warm : start from the frame before: its multipliers, and its positions moved as the target has
         moved. On frames 10 to 30 of the swing at 20 cells, 1%, 9 steps become 3 (medians).
+    max_steps : quadratic programs, after which it gives up.
     """
 
     name = "linearized-qp"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from math import ceil
 from time import perf_counter
@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from strainbench.fields import same, spelled
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import lumped_areas
 from strainbench.physics.cloth import Cloth, Material
@@ -140,14 +141,17 @@ class Scenario(ABC):
     @property
     def label(self) -> str:
         """Name, resolution and limit, then what else differs from the defaults."""
-        shown = {"resolution", "limit"}
-        changed = {
-            f.name: getattr(self, f.name)
-            for f in fields(self)
-            if f.name not in shown and getattr(self, f.name) != f.default
-        }
-        others = "".join(f", {k}={v}" for k, v in changed.items())
-        return f"{self.name} {self.resolution} at {100 * self.limit:g}%{others}"
+        return self.labelled({})
+
+    def labelled(self, words: Mapping[str, str]) -> str:
+        """The same; what was set in `words` is there as it was spelled, defaults too."""
+        default = type(self)().parameters
+        others = "".join(
+            f", {k}={words.get(k) or spelled(v)}"
+            for k, v in self.parameters.items()
+            if k not in ("resolution", "limit") and (k in words or not same(v, default[k]))
+        )
+        return f"{self.name} {self.resolution} at {100 * self.limit:.12g}%{others}"
 
     def limits(self) -> StretchLimits:
         """The same bound in all directions."""
@@ -208,7 +212,8 @@ class ClothScenario(SheetScenario):
 
     Parameters
     ----------
-    integrator : a key of `strainbench.physics.integrators.INTEGRATORS`.
+    integrator : sap, sar, bap or bar as in the paper, or sar-projected, bar-bdf2 or bar-stable,
+        our variants of them: `strainbench.physics.integrators`.
     step : time step [s].
     norm : "unweighted" as printed in Eq. 5, or "mass".
     """

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from strainbench.fields import same, spelled
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import square_grid
 from strainbench.problem import Problem
@@ -166,13 +167,13 @@ class Solver(ABC):
         if self.starts_warm:
             return replace(self, warm=False).label + "-warm"  # type: ignore[call-arg]
         default = type(self)().parameters
-        changed = {k: v for k, v in self.parameters.items() if v != default[k]}
+        changed = {k: v for k, v in self.parameters.items() if not same(v, default[k])}
         if not changed:
             return self.name
         for variant, settings in self.variants.items():
-            if changed == {k: v for k, v in settings.items() if v != default[k]}:
+            if same(changed, {k: v for k, v in settings.items() if not same(v, default[k])}):
                 return f"{self.name}-{variant}"
-        return self.name + "[" + ",".join(f"{k}={v}" for k, v in changed.items()) + "]"
+        return self.name + "[" + ",".join(f"{k}={spelled(v)}" for k, v in changed.items()) + "]"
 
 
 def warm_twin(solver: Solver) -> Solver:

@@ -74,6 +74,7 @@ class Admm(Solver):
     warm : start from the frame before: its multipliers, and its positions moved as the target has
         moved. On frames 10 to 30 of the swing at 20 cells, 1%, 855 iterations become 725
         (medians), and the worst frame's 3690 become 1220; to carry rho over too gains nothing.
+    max_iterations : after which it gives up.
 
     It reaches gaps of 1e-6 in 300 to 5000 iterations on frames of the swing at 10 to 40 cells, 1%
     and 0.1%; the violation of x is often the last to fall.

@@ -128,6 +128,8 @@ def _effort(sample: pd.Series) -> list[str]:
 def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
     """Rows violation, gap, distance; columns seconds, iterations."""
     drawn = [(n, rows) for n, rows in methods(table) if rows["seconds"].notna().any()]
+    if not drawn:
+        return []
     style = styles([name for name, _ in drawn])
     figure = Figure(figsize=(11.5, 10.5), layout="constrained")
     axes = figure.subplots(len(PANELS), len(AXES), sharex="col", sharey="row")
