@@ -74,9 +74,8 @@ def test_damaged_records_stop_a_run_and_stay(tmp_path):
     folder = tmp_path / "results"
     assert strainbench(*RUN, "--results", str(folder), cwd=tmp_path).returncode == 0
     path = folder / RUNS
-    sound = path.read_text(encoding="utf-8")
-    last = sound.rstrip("\n").rfind(",")  # before the field of the machine, however long its name
-    damaged = sound[:last] + "\n"
+    header, row = path.read_text(encoding="utf-8").splitlines()
+    damaged = f"{header}\n{row},one field more\n"
     path.write_text(damaged, encoding="utf-8")
     for verb in (RUN, ["report"]):
         done = strainbench(*verb, "--results", str(folder), cwd=tmp_path)
