@@ -261,6 +261,10 @@ def _record_fault(header: list[str], record: list[str]) -> str | None:
         return ": the header once more"
     if len(record) != len(header):
         return f" has {len(record)} fields where {len(header)} are valid"
+    if broken := next(
+        (name for name, text in zip(header, record, strict=True) if "\n" in text), None
+    ):
+        return f", column {broken}: an end of line where text on one line is valid"
     return None
 
 

@@ -10,7 +10,8 @@ import time
 
 import pytest
 
-from strainbench.records import RUNS, STEP_COLUMNS, STEPS, read_rows
+from strainbench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows, read_rows
+from tests.test_records import run_row
 
 RUN = ["run", "swing", "--solver", "none", "--set", "resolution=2", "--steps", "1"]
 
@@ -72,13 +73,32 @@ def test_a_solvers_failure_is_data_and_exit_0(tmp_path):
 def test_damaged_records_stop_a_run_and_stay(tmp_path):
     folder = tmp_path / "results"
     assert strainbench(*RUN, "--results", str(folder), cwd=tmp_path).returncode == 0
-    damaged = (folder / RUNS).read_text()[:-40]
-    (folder / RUNS).write_text(damaged)
+    path = folder / RUNS
+    header, row = path.read_text(encoding="utf-8").splitlines()
+    damaged = f"{header}\n{row},one field more\n"
+    path.write_text(damaged, encoding="utf-8")
     for verb in (RUN, ["report"]):
         done = strainbench(*verb, "--results", str(folder), cwd=tmp_path)
         assert done.returncode == 2
         assert "runs.csv, record 2" in done.stderr
-        assert (folder / RUNS).read_text() == damaged
+        assert path.read_text(encoding="utf-8") == damaged
+
+
+def test_an_unfinished_last_line_is_left_out_by_a_report_and_cut_away_by_a_run(tmp_path):
+    folder = tmp_path / "results"
+    folder.mkdir()
+    append_rows(folder / RUNS, RUN_COLUMNS, [run_row("a"), run_row("b")])
+    unfinished = (folder / RUNS).read_text(encoding="utf-8")[:-5]
+    (folder / RUNS).write_text(unfinished, encoding="utf-8")
+    done = strainbench("compare", str(folder), str(folder), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == f"{folder / RUNS}: its last line is unfinished and left out\n"
+    assert (folder / RUNS).read_text(encoding="utf-8") == unfinished
+    done = strainbench(*RUN, "--results", str(folder), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    words = "its last line was unfinished and is cut away"
+    assert (done.stdout + done.stderr).replace("\n", "").count(words) == 1
+    assert [row["cell"] for row in read_rows(folder / RUNS, RUN_COLUMNS)][:-1] == ["a"]
 
 
 def test_a_folder_that_cannot_be_written_to(tmp_path):

@@ -317,6 +317,8 @@ def damages(text):
     yield "blank line", r"record 3 has 0 fields", "".join([header, first, "\n", *rest])
     yield "header twice", r"record 3: the header once more", "".join([header, first, header, *rest])
     yield "open quote", r"record 3 has \d+ fields", "".join([header, first, '1,"b,', *rest])
+    last = text[: text.rindex("some machine")] + '"some machine\n'
+    yield "open quote at the end", r"record 4, column machine: an end of line", last
     for name, wrong, valid in [
         ("schema", "two", f"1 to {SCHEMA} is"),
         ("schema", "0", f"1 to {SCHEMA} is"),
@@ -341,7 +343,7 @@ def damages(text):
 SOUND = ",".join(RUN_COLUMNS) + "\n"
 
 
-@pytest.mark.parametrize("case", range(27))
+@pytest.mark.parametrize("case", range(28))
 @pytest.mark.parametrize("touch", [latest_runs, mend])
 def test_a_damaged_file_is_named_and_left_alone(runs, case, touch):
     _, words, text = list(damages(runs.read_text()))[case]
@@ -357,7 +359,7 @@ def test_a_damaged_file_is_named_and_left_alone(runs, case, touch):
 
 
 def test_all_damages_are_tried(runs):
-    assert len(list(damages(runs.read_text()))) == 27
+    assert len(list(damages(runs.read_text()))) == 28
 
 
 def test_damaged_steps_are_named(tmp_path):
