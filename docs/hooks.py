@@ -11,7 +11,6 @@ import ast
 import logging
 import posixpath
 import re
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,7 +22,9 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parent.parent
 LOG = logging.getLogger("mkdocs.hooks")
+LOCAL = "results/local"
 INTRO = "Introduction"  # what stands above the first section
+ROOM = "::: strainbench.{}\n    options: {{ heading_level: 1, show_root_full_path: true }}\n"
 WANTED = re.compile(r"^\{\{ (\S+): (.+) \}\}$", re.MULTILINE)
 LINK = re.compile(r"(?<=\]\()([^)\s#]*)(#[^)\s]*)?(?=\))")
 
@@ -67,7 +68,9 @@ def classes(path: Path) -> Iterator[str]:
     """The classes of a plug-in that are solvers or scenes: those with a name of their own."""
     module = path / "__init__.py" if path.is_dir() else path
     for node in ast.parse(module.read_text()).body:
-        names = [t for n in getattr(node, "body", []) if isinstance(n, ast.Assign) for t in n.targets]
+        names = [
+            t for n in getattr(node, "body", []) if isinstance(n, ast.Assign) for t in n.targets
+        ]
         if isinstance(node, ast.ClassDef) and any(ast.unparse(name) == "name" for name in names):
             yield node.name
 
@@ -75,7 +78,9 @@ def classes(path: Path) -> Iterator[str]:
 def plugin_page(package: str, title: str, path: Path) -> str:
     """What a plug-in's docstrings say."""
     module = f"{package}.{path.stem}"
-    options = "    options: { show_root_heading: false, show_root_toc_entry: false, members: false }"
+    options = (
+        "    options: { show_root_heading: false, show_root_toc_entry: false, members: false }"
+    )
     parts = [f"# {title}\n\n::: {module}\n{options}\n"]
     parts += [f"::: {module}.{name}\n    options: {{ members: false }}\n" for name in classes(path)]
     return "\n".join(parts)
@@ -90,7 +95,11 @@ def example_page(name: str) -> str:
 def face() -> str:
     """What `from strainbench import ...` offers."""
     tree = ast.parse((ROOT / "strainbench/__init__.py").read_text())
-    (names,) = (n.value for n in tree.body if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "__all__")
+    (names,) = (
+        n.value
+        for n in tree.body
+        if isinstance(n, ast.Assign) and ast.unparse(n.targets[0]) == "__all__"
+    )
     public = [str(name) for name in ast.literal_eval(names)]
     return "\n".join(f"- [`{name}`][strainbench.{name}]" for name in public)
 
@@ -105,7 +114,7 @@ def made() -> dict[str, str]:
         for title, path in plugins(package).items():
             pages[f"{folder}/{title}.md"] = plugin_page(package, title, path)
     pages |= {f"examples/{name}.md": example_page(name) for name in EXAMPLES}
-    pages |= {f"reference/{room}.md": f"::: strainbench.{room}\n" for room in rooms()}
+    pages |= {f"reference/{room}.md": ROOM.format(room) for room in rooms()}
     pages |= {f"{n.lower()}.md": (ROOT / f"{n}.md").read_text() for n in documents()}
     return pages
 
@@ -137,11 +146,11 @@ def on_files(files: Files, config: Any) -> Files:
     for place, text in made().items():
         files.append(File.generated(config, place, content=text))
     files.append(File.generated(config, "projection.svg", content=projection.draw()))
-    kept = subprocess.run(
-        ["git", "ls-files", "results", "LICENSE", "CITATION.cff"], cwd=ROOT, capture_output=True, text=True, check=True
-    )
-    for path in kept.stdout.split():
-        files.append(File.generated(config, path, abs_src_path=str(ROOT / path)))
+    kept = [path for path in (ROOT / "results").rglob("*") if ROOT / LOCAL not in path.parents]
+    for path in (*sorted(kept), ROOT / "LICENSE", ROOT / "CITATION.cff"):
+        if path.is_file():
+            place = path.relative_to(ROOT).as_posix()
+            files.append(File.generated(config, place, abs_src_path=str(path)))
     return files
 
 
@@ -158,7 +167,11 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
     text = WANTED.sub(section, markdown).replace("{{ the face }}", face())
     source = "results" if here == "results/README.md" else "."
-    return relinked(text, source, here) if here in ("results/README.md", "changelog.md", "security.md") else text
+    return (
+        relinked(text, source, here)
+        if here in ("results/README.md", "changelog.md", "security.md")
+        else text
+    )
 
 
 def on_post_build(**_: Any) -> None:
@@ -175,7 +188,9 @@ def relinked(text: str, folder: str, here: str) -> str:
         address, anchor = found[1], found[2] or ""
         if ":" in address or (not address and folder != "."):
             return found[0]
-        place = page_of(posixpath.normpath(posixpath.join(folder, address)) if address else "README.md", anchor)
+        place = page_of(
+            posixpath.normpath(posixpath.join(folder, address)) if address else "README.md", anchor
+        )
         return posixpath.relpath(place, posixpath.dirname(here) or ".") + anchor
 
     return LINK.sub(link, text)
@@ -200,7 +215,9 @@ def page_of(path: str, anchor: str) -> str:
 
 def _wanted_by() -> dict[str, str]:
     """The page on which each section of the README is."""
-    pages = {path.relative_to(ROOT / "docs").as_posix(): path for path in (ROOT / "docs").rglob("*.md")}
+    pages = {
+        path.relative_to(ROOT / "docs").as_posix(): path for path in (ROOT / "docs").rglob("*.md")
+    }
     return {
         title: place
         for place, path in pages.items()
