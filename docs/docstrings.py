@@ -17,12 +17,13 @@ SECTION = re.compile(
     re.MULTILINE,
 )
 ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : (.*))?$\n?((?:(?:[ ]{4}.*)?\n)*)", re.MULTILINE)
+ESCAPED = {"*": r"\*", "<": "&lt;"}
 FORMULA = re.compile(r"(^[ ]{4}.*|^>>>.*|`[^`]*`)|(?<=[\w)])\*|<(?=[A-Za-z])", re.MULTILINE)
 
 
 def as_numpydoc(text: str) -> str:
     """A docstring whose entries are a name, and below it everything that is said of it."""
-    escaped = FORMULA.sub(lambda found: found[1] or f"\\{found[0]}", text)
+    escaped = FORMULA.sub(lambda found: found[1] or ESCAPED[found[0]], text)
     return SECTION.sub(lambda found: _section(*found.groups()), escaped)
 
 

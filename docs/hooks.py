@@ -1,8 +1,9 @@
 """The site from what is there: sections of the README and CONTRIBUTING, docstrings, results.
 
-A page says `{{ README.md: Use }}` where it wants a section, which stays where it is written. Links
-between files of the repository become links between pages. The pages of methods, scenes, rooms,
-examples and results are made here, so that files may come and move without a word in docs/.
+A page says `{{ README.md: Use }}` where it wants a section, which stays where it is written, and
+`{{ list: face }}` where it wants a list that is made here. Links between files of the repository
+become links between pages. The pages of methods, scenes, rooms, examples and results are made here,
+so that files may come and move without a word in docs/.
 """
 
 from __future__ import annotations
@@ -104,6 +105,14 @@ def face() -> str:
     return "\n".join(f"- [`{name}`][strainbench.{name}]" for name in public)
 
 
+def tasks() -> str:
+    """What CONTRIBUTING tells how to do."""
+    return "\n".join(f"- [{t}]({p.removeprefix('howto/')})" for t, p in HOWTO.items() if t != INTRO)
+
+
+LISTS = {"face": face, "tasks": tasks}
+
+
 def made() -> dict[str, str]:
     """Pages by their place in the site."""
     pages = {
@@ -134,8 +143,13 @@ def on_config(config: Any) -> Any:
         {"Examples": ["examples/index.md", *(f"examples/{name}.md" for name in EXAMPLES)]},
         {"Methods": ["methods/index.md", *(f"methods/{name}.md" for name in plugins("solvers"))]},
         {"Scenes": ["scenes/index.md", *(f"scenes/{name}.md" for name in plugins("scenarios"))]},
-        {"Reference": ["reference/index.md", *(f"reference/{room}.md" for room in rooms())]},
-        {"Results": ["results.md", "results/README.md"]},
+        {
+            "Reference": [
+                "reference/index.md",
+                *({room: f"reference/{room}.md"} for room in rooms()),
+            ]
+        },
+        {"Results": ["results.md", {"All that was measured": "results/README.md"}]},
         {"About": ["about.md", *(f"{name.lower()}.md" for name in documents())]},
     ]
     return config
@@ -162,10 +176,12 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     here = page.file.src_uri
 
     def section(found: re.Match[str]) -> str:
+        if found[1] == "list":
+            return LISTS[found[2]]()
         USED.add((found[1], found[2]))
         return relinked(sections(found[1])[found[2]], ".", here)
 
-    text = WANTED.sub(section, markdown).replace("{{ the face }}", face())
+    text = WANTED.sub(section, markdown)
     source = "results" if here == "results/README.md" else "."
     return (
         relinked(text, source, here)

@@ -43,6 +43,7 @@ def test_the_site_builds_strictly_and_needs_no_other_host(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     pages = {p.relative_to(tmp_path).as_posix(): p.read_text() for p in tmp_path.rglob("*.html")}
     assert "make bench" in pages["index.html"]
+    assert "sum_i &lt;Y_i, (G x)_i&gt; - b_i" in pages["reference/referee.html"]
     assert "<svg" in (tmp_path / "projection.svg").read_text()
     for name in ("examples/project_a_sheet", "methods/newton-ipm", "scenes/swing", "changelog"):
         assert f"{name}.html" in pages
@@ -97,7 +98,7 @@ def test_docstrings_become_numpydoc(tool):
     text = "Sum of x* and <Y, x>.\n\nParameters\n----------\n"
     text += "a, b : (n,)\n    Both [m].\nc : how\n    many.\n\nMore.\n"
     assert tool("docstrings").as_numpydoc(text) == (
-        "Sum of x\\* and \\<Y, x>.\n\nParameters\n----------\n"
+        "Sum of x\\* and &lt;Y, x>.\n\nParameters\n----------\n"
         "a\n    (n,). Both [m].\nb\n    (n,). Both [m].\nc\n    how many.\n\nNotes\n-----\nMore.\n"
     )
 
