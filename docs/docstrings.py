@@ -2,7 +2,7 @@
 
 A line "tolerance : the largest violation to aim for." under Parameters or Attributes has text where
 numpydoc has a type. Types are in the annotations, so all of it becomes the description. And in
-formulas x* is no emphasis, <Y, x> no HTML.
+formulas x* is no emphasis, <Y, x> no HTML, and ||x|| no empty cell of a table.
 """
 
 from __future__ import annotations
@@ -17,12 +17,14 @@ SECTION = re.compile(
     re.MULTILINE,
 )
 ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : (.*))?$\n?((?:(?:[ ]{4}.*)?\n)*)", re.MULTILINE)
+TABLE = re.compile(r"^[|] .*", re.MULTILINE)
 ESCAPED = {"*": r"\*", "<": "&lt;"}
 FORMULA = re.compile(r"(^[ ]{4}.*|^>>>.*|`[^`]*`)|(?<=[\w)])\*|<(?=[A-Za-z])", re.MULTILINE)
 
 
 def as_numpydoc(text: str) -> str:
     """A docstring whose entries are a name, and below it everything that is said of it."""
+    text = TABLE.sub(lambda found: found[0].replace("||", r"\|\|"), text)
     escaped = FORMULA.sub(lambda found: found[1] or ESCAPED[found[0]], text)
     return SECTION.sub(lambda found: _section(*found.groups()), escaped)
 

@@ -103,6 +103,11 @@ def test_docstrings_become_numpydoc(tool):
     )
 
 
+def test_a_norm_in_a_table_is_no_empty_cell(tool):
+    table = "| a | ||x|| <= b |\n"
+    assert tool("docstrings").as_numpydoc(table) == "| a | \\|\\|x\\|\\| <= b |\n"
+
+
 def test_in_the_picture_only_the_closest_point_touches_the_lower_bound(tool):
     projection = tool("projection")
     import numpy as np
