@@ -69,7 +69,7 @@ check: setup ## format, lint, types, tests
 	$(TESTS)
 
 docs: setup ## the documentation, into results/local/docs/index.html; broken links fail it
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 graph: setup ## the rooms of the code: floors, lines, what imports what, and what does so upwards
 	$(BIN)/python -m tests.imports

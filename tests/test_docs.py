@@ -28,7 +28,7 @@ def tool(monkeypatch):
 
 def build(source, site):
     return subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", site],
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", site],
         cwd=source,
         env={**os.environ, "PYTHONPATH": str(source)},
         capture_output=True,
@@ -51,6 +51,17 @@ def test_the_site_builds_strictly_and_needs_no_other_host(tmp_path):
         loaded = re.findall(r"<(?:script|link|img)[^>]*(?:src|href)=\"?(https?:[^\s\">]+)", page)
         assert not loaded, f"{name} loads {loaded}"
         assert "{{ README" not in page
+
+
+@pytest.mark.parametrize("link", ["nowhere.md", "index.md#nowhere", "data/none.csv"])
+def test_a_broken_link_fails_the_build(tmp_path, link):
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs/index.md").write_text(f"# Here\n[there]({link})\n")
+    own = f"INHERIT: {ROOT / 'mkdocs.yml'}\ndocs_dir: docs\nhooks: []\nplugins: []\n"
+    (tmp_path / "mkdocs.yml").write_text(own)
+    done = build(tmp_path, tmp_path / "site")
+    assert done.returncode == 1
+    assert link in done.stderr
 
 
 def test_every_plugin_example_and_room_has_a_page(tool):
