@@ -15,7 +15,7 @@ TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipo
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test quick check graph perf report clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick check docs graph perf report clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -65,8 +65,11 @@ check: setup ## format, lint, types, tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/mypy examples
+	$(BIN)/mypy examples docs tests/imports.py
 	$(TESTS)
+
+docs: setup ## the documentation, into results/local/docs/index.html; broken links fail it
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 graph: setup ## the rooms of the code: floors, lines, what imports what, and what does so upwards
 	$(BIN)/python -m tests.imports
@@ -86,7 +89,7 @@ $(VENV)/.done: pyproject.toml Makefile
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; \
 		sys.exit(0 if v >= (3, 11) else f"strainbench needs Python 3.11 or later; $(PYTHON) is {v[0]}.{v[1]}: make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev,pardiso]'
+	$(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev,docs,pardiso]'
 	@$(MAKE) --no-print-directory ipopt || \
 		echo "Ipopt could not be set up (see above): the ipopt solvers will be unavailable, the rest works."
 	@touch $@

@@ -1,8 +1,8 @@
 """Docstrings as this project writes them, for Griffe.
 
 A line "tolerance : the largest violation to aim for." under Parameters or Attributes has text where
-numpydoc has a type. Types are in the annotations, so all of it becomes the description. And in formulas
-x* is no emphasis, <Y, x> no HTML.
+numpydoc has a type. Types are in the annotations, so all of it becomes the description. And in
+formulas x* is no emphasis, <Y, x> no HTML, and ||x|| no empty cell of a table.
 """
 
 from __future__ import annotations
@@ -12,22 +12,28 @@ from typing import Any
 
 import griffe
 
-SECTION = re.compile(r"^(Parameters|Attributes)\n-+\n((?:.+\n?|\n(?=[ \w]))*)", re.MULTILINE)
-ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : (.*))?\n?((?:(?:[ ]{4}.*)?\n)*)", re.MULTILINE)
-
-
+SECTION = re.compile(
+    r"^(Parameters|Attributes)\n-+\n((?:[ ]*\S.*\n?|\n(?=[ ]{4}))+)(\n(?!\w+\n-)(?=\S))?",
+    re.MULTILINE,
+)
+ENTRY = re.compile(r"^(\w[\w, ]*?)(?: : (.*))?$\n?((?:(?:[ ]{4}.*)?\n)*)", re.MULTILINE)
+TABLE = re.compile(r"^[|] .*", re.MULTILINE)
+ESCAPED = {"*": r"\*", "<": "&lt;"}
 FORMULA = re.compile(r"(^[ ]{4}.*|^>>>.*|`[^`]*`)|(?<=[\w)])\*|<(?=[A-Za-z])", re.MULTILINE)
 
 
 def as_numpydoc(text: str) -> str:
     """A docstring whose entries are a name, and below it everything that is said of it."""
-    escaped = FORMULA.sub(lambda found: found[1] or f"\\{found[0]}", text)
-    return SECTION.sub(lambda found: _section(found[1], found[2]), escaped)
+    text = TABLE.sub(lambda found: found[0].replace("||", r"\|\|"), text)
+    escaped = FORMULA.sub(lambda found: found[1] or ESCAPED[found[0]], text)
+    return SECTION.sub(lambda found: _section(*found.groups()), escaped)
 
 
-def _section(title: str, body: str) -> str:
+def _section(title: str, body: str, prose: str | None) -> str:
+    """What follows a section without a heading gets one, or it would be taken for an entry."""
     entries = ENTRY.sub(lambda found: _entry(found[1], found[2] or "", found[3]), body + "\n")
-    return f"{title}\n{'-' * len(title)}\n{entries}"
+    notes = "" if prose is None else "\nNotes\n-----\n"
+    return f"{title}\n{'-' * len(title)}\n{entries}{notes}"
 
 
 def _entry(names: str, first: str, rest: str) -> str:

@@ -1,8 +1,9 @@
 """The site from what is there: sections of the README and CONTRIBUTING, docstrings, results.
 
-A page says `{{ README.md: Use }}` where it wants a section, which stays where it is written. Links
-between files of the repository become links between pages. The pages of methods, scenes, rooms,
-examples and results are made here, so that files may come and move without a word in docs/.
+A page says `{{ README.md: Use }}` where it wants a section, which stays where it is written, and
+`{{ list: face }}` where it wants a list that is made here. Links between files of the repository
+become links between pages. The pages of methods, scenes, rooms, examples and results are made here,
+so that files may come and move without a word in docs/.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ import ast
 import logging
 import posixpath
 import re
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,9 @@ from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).parent.parent
 LOG = logging.getLogger("mkdocs.hooks")
+LOCAL = "results/local"
 INTRO = "Introduction"  # what stands above the first section
+ROOM = "::: strainbench.{}\n    options: {{ heading_level: 1, show_root_full_path: true }}\n"
 WANTED = re.compile(r"^\{\{ (\S+): (.+) \}\}$", re.MULTILINE)
 LINK = re.compile(r"(?<=\]\()([^)\s#]*)(#[^)\s]*)?(?=\))")
 
@@ -103,6 +105,14 @@ def face() -> str:
     return "\n".join(f"- [`{name}`][strainbench.{name}]" for name in public)
 
 
+def tasks() -> str:
+    """What CONTRIBUTING tells how to do."""
+    return "\n".join(f"- [{t}]({p.removeprefix('howto/')})" for t, p in HOWTO.items() if t != INTRO)
+
+
+LISTS = {"face": face, "tasks": tasks}
+
+
 def made() -> dict[str, str]:
     """Pages by their place in the site."""
     pages = {
@@ -113,7 +123,7 @@ def made() -> dict[str, str]:
         for title, path in plugins(package).items():
             pages[f"{folder}/{title}.md"] = plugin_page(package, title, path)
     pages |= {f"examples/{name}.md": example_page(name) for name in EXAMPLES}
-    pages |= {f"reference/{room}.md": f"::: strainbench.{room}\n" for room in rooms()}
+    pages |= {f"reference/{room}.md": ROOM.format(room) for room in rooms()}
     pages |= {f"{n.lower()}.md": (ROOT / f"{n}.md").read_text() for n in documents()}
     return pages
 
@@ -133,8 +143,13 @@ def on_config(config: Any) -> Any:
         {"Examples": ["examples/index.md", *(f"examples/{name}.md" for name in EXAMPLES)]},
         {"Methods": ["methods/index.md", *(f"methods/{name}.md" for name in plugins("solvers"))]},
         {"Scenes": ["scenes/index.md", *(f"scenes/{name}.md" for name in plugins("scenarios"))]},
-        {"Reference": ["reference/index.md", *(f"reference/{room}.md" for room in rooms())]},
-        {"Results": ["results.md", "results/README.md"]},
+        {
+            "Reference": [
+                "reference/index.md",
+                *({room: f"reference/{room}.md"} for room in rooms()),
+            ]
+        },
+        {"Results": ["results.md", {"All that was measured": "results/README.md"}]},
         {"About": ["about.md", *(f"{name.lower()}.md" for name in documents())]},
     ]
     return config
@@ -145,15 +160,11 @@ def on_files(files: Files, config: Any) -> Files:
     for place, text in made().items():
         files.append(File.generated(config, place, content=text))
     files.append(File.generated(config, "projection.svg", content=projection.draw()))
-    kept = subprocess.run(
-        ["git", "ls-files", "results", "LICENSE", "CITATION.cff"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    for path in kept.stdout.split():
-        files.append(File.generated(config, path, abs_src_path=str(ROOT / path)))
+    kept = [path for path in (ROOT / "results").rglob("*") if ROOT / LOCAL not in path.parents]
+    for path in (*sorted(kept), ROOT / "LICENSE", ROOT / "CITATION.cff"):
+        if path.is_file():
+            place = path.relative_to(ROOT).as_posix()
+            files.append(File.generated(config, place, abs_src_path=str(path)))
     return files
 
 
@@ -165,10 +176,12 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
     here = page.file.src_uri
 
     def section(found: re.Match[str]) -> str:
+        if found[1] == "list":
+            return LISTS[found[2]]()
         USED.add((found[1], found[2]))
         return relinked(sections(found[1])[found[2]], ".", here)
 
-    text = WANTED.sub(section, markdown).replace("{{ the face }}", face())
+    text = WANTED.sub(section, markdown)
     source = "results" if here == "results/README.md" else "."
     return (
         relinked(text, source, here)
