@@ -394,8 +394,9 @@ def export(
         ),
     ],
     format_: Annotated[
-        str, typer.Option("--format", help="cbf or npz; by default what the file's name ends in")
-    ] = "",
+        str | None,
+        typer.Option("--format", help="cbf or npz; by default what the file's name ends in"),
+    ] = None,
     solver: Annotated[
         str, typer.Option(help="answers the projections before; name, or path of a .py file")
     ] = REFERENCE_SOLVER,
@@ -410,7 +411,7 @@ def export(
         raise ValueError(
             f"-o {output} is a folder: a file is valid, such as {output / 'frame.cbf'}"
         )
-    kind = check_format(format_ or output.suffix.removeprefix("."))
+    kind = check_format(output.suffix.removeprefix(".") if format_ is None else format_)
     cell = plan_one(scenario, solver, set_ or [], frame, tolerance)
     open_folder(output.parent, "-o")
     problem = _record(cell, frame)

@@ -106,7 +106,8 @@ def parse_frames(text: str) -> list[list[int]]:
     except ValueError:
         ends = []
     if not ends or any(len(e) > 2 or e[0] < 1 or e[-1] < e[0] for e in ends):
-        raise ValueError(f"--frame {shown(text)}: whole numbers above 0 and ranges, as in 5,14-29")
+        valid = "whole numbers above 0 and ranges are valid, as in 5,14-29"
+        raise ValueError(f"--frame {shown(text)}: {valid}")
     if (last := max(e[-1] for e in ends)) > MOST_FRAMES:
         raise ValueError(f"--frame {text}: {last} is too many; up to {MOST_FRAMES} is valid")
     return [list(range(e[0], e[-1] + 1)) for e in ends]

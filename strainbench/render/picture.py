@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from strainbench.escape import chart
 from strainbench.limits import FloatArray
 from strainbench.problem import IntArray
 from strainbench.render.export import surface
@@ -184,7 +185,7 @@ class Picture:
 
     def _words(self) -> None:
         """Titles; those that change with the frames are filled in by `draw`."""
-        self.heading = self.figure.text(0.03, 0.935, self.film.scene, size=13, weight="bold")
+        self.heading = self.figure.text(0.03, 0.935, chart(self.film.scene), size=13, weight="bold")
         self.line = self.figure.text(0.03, 0.885, "", size=10.5, color="#333333")
         if len(self.problem.pinned):
             handle = self.ax.legend(
@@ -216,7 +217,7 @@ class Picture:
         self.pins.set_data(*seen[self.problem.pinned, :2].T)
         clock = f"step {frame.step}" if frame.time is None else f"t = {frame.time:.3f} s"
         self.line.set_text(
-            f"{self.film.solver},  {clock},  largest strain {100 * strains.max():.2f}%"
+            f"{chart(self.film.solver)},  {clock},  largest strain {100 * strains.max():.2f}%"
         )
         for text in (self.heading, self.line):
             self._fit(text)

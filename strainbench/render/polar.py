@@ -14,6 +14,7 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import linprog
 
+from strainbench.escape import chart
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.plan import plan_available
 from strainbench.problem import Problem
@@ -176,7 +177,7 @@ def _draw_limits(
 
 def _draw_film(ax: PolarAxes, film: Film, strain: FloatArray, colour: str, top: float) -> None:
     largest, usual = strain.max(axis=0), np.percentile(strain, REPORTED, axis=0)
-    name = "\n".join(wrap(film.solver, 28))
+    name = "\n".join(map(chart, wrap(film.solver, 28)))
     cut = "\n(beyond the axis)" if largest.min() > top else ""
     ax.plot(
         *_closed(ANGLES, largest),
@@ -230,4 +231,4 @@ def _title(films: Sequence[Film]) -> str:
     clock = f"step {last.step}" if last.time is None else f"t = {last.time:.3g} s"
     if len({film.frames[-1].step for film in films}) > 1:
         clock = "last frame of each"
-    return f"{films[0].scene}, {clock}: strain over the material angle"
+    return f"{chart(films[0].scene)}, {clock}: strain over the material angle"
