@@ -39,7 +39,9 @@ def judge(
     certificates = _certificates(cell, folder, len(projections), cache)
     steps = _step_rows(cell, events, projections, certificates)
     row = _run_row(cell, events, projections, certificates, ending)
-    missed = _missed(cell.scenario.scenario(), folder, len(projections), int(str(row["steps_done"])))
+    missed = _missed(
+        cell.scenario.scenario(), folder, len(projections), int(str(row["steps_done"]))
+    )
     row["reason"] = "; ".join(filter(None, [str(row["reason"]), *missed]))
     row["judge_seconds"] = time.perf_counter() - begin
     return row, steps

@@ -10,9 +10,10 @@ from strainbench.records import RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_markdown
 from strainbench.report.failures import failures, failures_markdown
+from strainbench.report.names import with_names
 from strainbench.report.page import write_page
 from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_markdown
-from strainbench.report.table import as_latex, as_markdown, describe, tidy
+from strainbench.report.table import as_latex, as_markdown, tidy
 
 WORDS = {
     *(
@@ -47,9 +48,7 @@ def load_runs(folder: Path) -> pd.DataFrame:
     runs = pd.DataFrame(rows)
     for column in runs.columns.difference(list(WORDS)):
         runs[column] = pd.to_numeric(runs[column])
-    spanned = ("resolution", "limit")  # within a table
-    runs["setting"] = [describe(text, spanned) for text in runs["scenario_parameters"]]
-    return runs
+    return with_names(runs)
 
 
 def write_report(folder: Path) -> list[Path]:

@@ -6,7 +6,6 @@ import csv
 import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +13,11 @@ from rich import box
 from rich.table import Table
 
 from strainbench.records import RecordsError, Row, latest_runs, open_folder
+from strainbench.report.names import cells, digits
 from strainbench.report.pair import SAME, Pair
 
 MEASURES = ("outcome", "steps_done", "solve_seconds_mean", "max_violation", "relative_gap_max")
-HEADER = ("cells", "limit", "method", "outcome", "A [s]", "B [s]", "B/A", "violation", "gap")
+HEADER = ("mesh", "limit", "method", "outcome", "A [s]", "B [s]", "B/A", "violation", "gap")
 CSV_HEADER = (
     *SAME,
     *(f"{name}_{side}" for name in MEASURES for side in "ab"),
@@ -48,6 +48,8 @@ class Comparison:
             lines.append(
                 f"The machines differ, so times do not compare: A on {here}; B on {there}."
             )
+        elif elsewhere := sum(not p.in_one_place for p in self.matched):
+            lines.append(f"{elsewhere} cells ran on other threads or machines: no ratio of times.")
         changed = sum(a["outcome"] != b["outcome"] for a, b in (p.both for p in self.matched))
         lines.append(
             f"A is {self.names[0]}, B is {self.names[1]}: {len(self.matched)} cells in both, "
@@ -58,7 +60,8 @@ class Comparison:
             mean = float(np.exp(np.log(ratios).mean()))
             lines.append(
                 f"Seconds, B/A: geometric mean {mean:.2f}, from {ratios.min():.2f} to "
-                f"{ratios.max():.2f}, over the {len(ratios)} cells finished in both."
+                f"{ratios.max():.2f}, over the {len(ratios)} cells finished in both, "
+                "on one machine and as many threads."
             )
         return lines
 
@@ -67,12 +70,11 @@ class Comparison:
 
     def groups(self) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
         """Titles and lines of the tables."""
-        for title, pairs in groupby(sorted(self.matched, key=self._order), lambda p: p.group):
-            yield title, [pair.cells() for pair in pairs]
-
-    def _order(self, pair: Pair) -> int:
-        """Cells of one group side by side, groups in the order of the first folder."""
-        return list(dict.fromkeys(p.group for p in self.matched)).index(pair.group)
+        tables: dict[tuple[str, ...], list[Pair]] = {}
+        for pair in self.matched:
+            tables.setdefault(pair.alike, []).append(pair)
+        for pairs in tables.values():
+            yield pairs[0].group, [pair.cells() for pair in pairs]
 
     def foot(self) -> list[str]:
         """Lines below the tables."""
@@ -80,7 +82,7 @@ class Comparison:
         for pair in self.pairs:
             if not (pair.a and pair.b):
                 side = f"only in {'A' if pair.a else 'B'}"
-                about = f"{side}, {pair.group}, {pair.row['resolution']} cells, {pair.limit}"
+                about = f"{side}, {pair.group}, {cells(pair.mesh)}, {pair.limit}"
                 alone.setdefault(about, []).append(pair.row["solver"])
         return [p.note for p in self.matched if p.note] + [
             f"{about}: {', '.join(solvers)}" for about, solvers in alone.items()
@@ -136,7 +138,8 @@ def compare(first: Path, second: Path) -> Comparison:
             raise RecordsError(f"{folder} holds no results to compare")
         sides.append({tuple(row[name] for name in SAME): row for row in rows})
     a, b = sides
-    pairs = [Pair(a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b])]
+    precision = digits(row["scenario_parameters"] for side in sides for row in side.values())
+    pairs = [Pair(a.get(key), b.get(key), precision) for key in dict.fromkeys([*a, *b])]
     return Comparison((str(first), str(second)), pairs)
 
 

@@ -10,12 +10,14 @@ from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
 from strainbench.report import warm
+from strainbench.report.numbers import seconds_text
 from strainbench.report.table import (
+    REASONS,
     accuracy_text,
     details,
     explanation,
     groups,
-    ledger,
+    ledger_lines,
     reasons,
     time_text,
 )
@@ -44,9 +46,11 @@ def write_page(
         twins_explanation=warm.EXPLANATION.replace("`", ""),
         time_text=time_text,
         accuracy_text=accuracy_text,
+        seconds_text=seconds_text,
+        reasons_title=REASONS,
         reasons=reasons(runs),
         details=details(runs),
-        ledger=ledger(runs).itertuples(index=False),
+        ledger=ledger_lines(runs),
         machines=machines,
     )
     path.write_text(page)
