@@ -26,7 +26,7 @@ FLOOR_MM = 1e-6
 
 BAND = 4.0
 """The band of those without an answer begins at its middle over this, and ends at times this."""
-SPREAD = 3.0  # between the fastest solve and those that solved nothing
+SPREAD = 4.0  # from the fastest solve to those that solved nothing, and to the panel's edges
 
 
 RESOLVED: dict[str, Any] = {"color": "#777777", "linestyle": "--", "linewidth": 1}
@@ -69,10 +69,14 @@ def _draw_group(group: Group, style: dict[str, dict[str, Any]], stem: Path) -> l
     axes = figure.subplots(len(limits), len(meshes), sharex=True, sharey=True, squeeze=False)
     known = 1000 * runs["distance_max"].replace(np.inf, np.nan).clip(lower=FLOOR_MM / 1000)
     top = 30 * known.max() if known.notna().any() else 1.0
-    left = np.fmin(runs["solve_seconds_mean"].min(), 1.0) / SPREAD
+    seconds = runs["solve_seconds_mean"].fillna(
+        np.fmin(runs["solve_seconds_mean"].min(), 1.0) / SPREAD
+    )
+    runs = runs.assign(seconds=seconds)
+    axes[0, 0].set_xlim(seconds.min() / SPREAD, seconds.max() * SPREAD)
     for (limit, mesh), rows in runs.groupby(["bound", "mesh"], sort=False):
         ax = axes[limits.index(limit), meshes.index(mesh)]
-        _panel(ax, rows, style, top, left)
+        _panel(ax, rows, style, top)
         ax.set_title(f"{cells(mesh)}, {limit} limit" if limit else cells(mesh), size=10)
     for row in axes:
         row[0].set_ylabel("distance to optimum [mm]")
@@ -93,16 +97,8 @@ def save(figure: Figure, stem: Path) -> list[Path]:
     return paths
 
 
-def _panel(
-    ax: Axes, rows: pd.DataFrame, style: dict[str, dict[str, Any]], top: float, left: float
-) -> None:
-    """The points of one mesh and limit; failures in a band at the top.
-
-    Parameters
-    ----------
-    top : the middle of the band [mm]
-    left : where those stand that solved nothing [s]
-    """
+def _panel(ax: Axes, rows: pd.DataFrame, style: dict[str, dict[str, Any]], top: float) -> None:
+    """The points of one mesh and limit; failures in a band with its middle at `top` [mm]."""
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.grid(visible=True, which="major", color="#dddddd", linewidth=0.6)
@@ -111,11 +107,10 @@ def _panel(
     ax.text(0.02, 0.985, "no answer", transform=ax.transAxes, va="top", size=8, color="#555555")
     for _, row in rows.iterrows():
         answered = row["outcome"] != "no answer"
-        seconds = left if pd.isna(row["solve_seconds_mean"]) else row["solve_seconds_mean"]
         seen = min(max(1000 * row["distance_max"], FLOOR_MM), top / BAND)  # it may be infinite
         look = style[row["solver"]]
         ax.plot(
-            seconds,
+            row["seconds"],
             seen if answered else top,
             linestyle="none",
             markersize=8,
@@ -124,7 +119,7 @@ def _panel(
             **look,
         )
         if answered:
-            draw_certified(ax, seconds, row, look["color"])
+            draw_certified(ax, row["seconds"], row, look["color"])
     unknown = rows[rows["distance_max"].isna() & (rows["outcome"] != "no answer")]
     if len(unknown):
         names = wrap(f"no distance known: {', '.join(unknown['solver'])}", 48)

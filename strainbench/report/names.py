@@ -57,7 +57,7 @@ def describe(
         if isinstance(value, float)
         else f"{key} {value}"
         for key, value in settings(text).items()
-        if key not in without
+        if key not in without and value != ""
     )
 
 

@@ -6,7 +6,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from strainbench.records import Row
-from strainbench.report.names import SPANNED, cells, describe, digits, limit_name, mesh_name, settings
+from strainbench.report.names import (
+    SPANNED,
+    cells,
+    describe,
+    digits,
+    limit_name,
+    mesh_name,
+    settings,
+)
 from strainbench.report.numbers import seconds_text
 from strainbench.report.table import UNCONSTRAINED, power
 

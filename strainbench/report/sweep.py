@@ -12,6 +12,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 
 from strainbench.report.chart import CERTIFIED, FLOOR_MM, draw_certified, save, styles
 from strainbench.report.names import describe, digits, digits_of, settings
@@ -80,7 +81,8 @@ def sweep_markdown(runs: pd.DataFrame) -> list[str]:
         precision = digits(rows["rest"])
         for _, group in rows.groupby("line", sort=False):
             first = group.iloc[0]
-            about = ", ".join([describe(first["rest"], (), precision), *_how(first, rows)])
+            rest = describe(first["rest"], (), precision)
+            about = ", ".join(filter(None, (first["mode"], rest, *_how(first, rows))))
             solvers = list(dict.fromkeys(group["solver"]))
             header = [key, *(t for s in solvers for t in (f"{s} [s]", *columns))]
             lines = [header, ["---"] * len(header)]
@@ -93,8 +95,7 @@ def sweep_markdown(runs: pd.DataFrame) -> list[str]:
                 ]
                 lines.append([at["shown"].iloc[0], *texts])
             table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-            title = f"{first['scenario']} against {key} ({first['mode']}, {about})"
-            parts.append(f"## {title}\n\n{table}")
+            parts.append(f"## {first['scenario']} against {key} ({about})\n\n{table}")
     return parts
 
 
@@ -141,6 +142,8 @@ def _axes(ax: Axes, rows: pd.DataFrame, key: str, name: str) -> None:
     slant: dict[str, Any] = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"}
     ax.set_xticks(ticks["value"], ticks["shown"], size=8, **(slant if crowded else {}))
     ax.xaxis.minorticks_off()
+    everywhere = ax.get_xaxis_transform()  # so that all panels have the same values
+    ax.plot(ticks["value"], [0.5] * len(ticks), alpha=0, transform=everywhere)
     ax.set_xlabel(key)
     ax.set_ylabel(name)
     ax.grid(visible=True, color="#dddddd", linewidth=0.6)
@@ -174,7 +177,8 @@ def _band(ax: Axes) -> None:
     """The upper part of a panel, for cells without an answer."""
     bottom, top = ax.get_ylim()
     ax.set_ylim(bottom, top * (top / bottom) ** (BAND / (1 - BAND)))
-    ax.axhspan(1 - BAND, 1, color="#eeeeee", zorder=0, transform=ax.transAxes)
+    across: dict[str, Any] = {"color": "#eeeeee", "zorder": 0, "transform": ax.transAxes}
+    ax.add_patch(Rectangle((0, 1 - BAND), 1, BAND, **across))
     ax.text(0.02, 0.98, "no answer", transform=ax.transAxes, va="top", size=8, color="#555555")
 
 

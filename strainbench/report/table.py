@@ -102,7 +102,7 @@ def time_text(row: pd.Series | None) -> str:
 
 def accuracy_text(row: pd.Series | None) -> str:
     """Violation, relative gap, distance in mm."""
-    if row is None or pd.isna(row["max_violation"]):
+    if row is None or mark(row) == "-" or pd.isna(row["max_violation"]):
         return ""
     if pd.isna(row["relative_gap_max"]):
         return f"{power(row['max_violation'])} · local"
