@@ -245,7 +245,7 @@ class ClothScenario(SheetScenario):
         return max(FEWEST_STEPS, ceil(self.lasts / self.step))
 
     def has_begun(self, candidate: FloatArray) -> bool:
-        """See the base class: a vertex is in the margin of an obstacle, if there are any."""
+        """See the base class: whether a vertex is in an obstacle's margin, if there are any."""
         contact = self.contact()
         return contact is None or contact.touches(candidate)
 

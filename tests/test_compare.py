@@ -98,7 +98,7 @@ def test_csv_and_markdown(found, tmp_path):
     for name in ("c.csv", "c.md"):
         write_comparison(found, tmp_path / "new folder" / name)
     text = (tmp_path / "new folder/c.md").read_text()
-    assert "| 10 | 1% | worse | optimal → violated | 0.0200 | 0.0400 | 2.00 |" in text
+    assert "| 10×10 | 1% | worse | optimal → violated | 0.0200 | 0.0400 | 2.00 |" in text
     with pytest.raises(ValueError, match=r"ends in .csv, .md is valid"):
         write_comparison(found, tmp_path / "c.html")
 

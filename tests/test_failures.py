@@ -152,7 +152,7 @@ METHODS, SHARED = (
     [
         (STRESS, "best", "✓", "", ""),
         (STRESS, "weak", "✗", "violated by 3e-3, says iteration limit", f"optimal at {METHODS}"),
-        (STRESS, "rough", "○", "gap 5e-2, 0.004 mm", f"feasible at {SHARED}"),
+        (STRESS, "rough", "○", "gap 5e-2, 0.009 mm", f"feasible at {SHARED}"),
         (STRESS, "lost", "✗", "time limit of 9 s", f"violated at {SHARED}"),
         (STRESS, "alone", "✗", "crashed", "not run at severity 0.1"),
         (STRESS, "proud", "✗", "unsupported: too thin", "refused"),
@@ -184,7 +184,7 @@ def test_the_report_writes_the_table(folder):
     assert folder / "failures.csv" in paths
     text = (folder / "failures.md").read_text()
     assert f"| method | {STRESS} | {TWIST} |" in text
-    assert "| rough | ○ gap 5e-2, 0.004 mm † |  |" in text
+    assert "| rough | ○ gap 5e-2, 0.009 mm † |  |" in text
     assert f"- weak: violated by 3e-3, says iteration limit; optimal at {METHODS}" in text
 
 

@@ -41,8 +41,8 @@ def row(solver, **changes):
         **{"limit": 0.01, "directions": 4, "integrator": "sap", "solver": solver},
         **{"tolerance": 1e-6, "mode": "simulate", "steps_asked": 10, "steps_done": 10},
         **{"outcome": "optimal", "solve_seconds_mean": 0.02, "ie_seconds_mean": 0.005},
-        **{"max_violation": 3e-9, "relative_gap_max": 2e-6, "distance_max": 4e-6},
-        **{"reference_error_max": 3e-5, "projections_violated": 0, "violation_threshold": 1e-6},
+        **{"max_violation": 3e-9, "relative_gap_max": 2e-6, "distance_max": 9e-6},
+        **{"reference_error_max": 1e-6, "projections_violated": 0, "violation_threshold": 1e-6},
         **{"gap_threshold": 1e-4, "machine": "a machine", "scenario_parameters": "{}"},
     }
     return base | changes
@@ -101,7 +101,7 @@ def test_marks_follow_the_referee(by_solver, solver, sign, text):
 
 
 def test_accuracy_stands_beside_the_time(by_solver):
-    assert accuracy_text(by_solver["good"]) == "3e-9 · 2e-6 · 0.004"
+    assert accuracy_text(by_solver["good"]) == "3e-9 · 2e-6 · 0.009"
     assert accuracy_text(by_solver["absent"]) == ""
     assert accuracy_text(None) == ""
 
@@ -109,12 +109,12 @@ def test_accuracy_stands_beside_the_time(by_solver):
 def test_infeasible_frames_have_no_part_in_the_references_error(folder):
     torn = row("torn", outcome="violated", reference_error_max="inf", projections_violated=1)
     append_rows(folder / RUNS, RUN_COLUMNS, [torn])
-    assert "certified to within 0.03 mm" in " ".join(explanation(load_runs(folder)).split())
+    assert "certified to within 0.001 mm" in " ".join(explanation(load_runs(folder)).split())
 
 
 def test_the_table_has_the_papers_shape(folder):
     (group,) = groups(load_runs(folder))
-    assert group.resolutions == [10, 20]
+    assert group.meshes == ["10×10", "20×20"]
     assert group.implicit_euler()[0] == pytest.approx(0.005)
     assert [solver for _, solver, _ in group.blocks()] == [
         "good",
@@ -247,7 +247,7 @@ def test_cold_and_warm_starts_stand_side_by_side(tmp_path):
     append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
     runs = load_runs(tmp_path)
     (pair,) = pairs(runs)
-    expected = ("swing 10, simulate", "1%", "good", "1.50", "12 → 5", "1 → 2")
+    expected = ("swing 10×10, simulate", "1%", "good", "1.50", "12 → 5", "1 → 2")
     assert pair.line() == expected
     first = next(group for group in groups(runs) if "simulate" in group.title)
     names = [solver for _, solver, _ in first.blocks()]

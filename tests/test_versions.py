@@ -10,7 +10,9 @@ from strainbench.judge import identity
 from strainbench.machine import PACKAGES, describe_machine, installed
 from strainbench.plan import plan
 from strainbench.records import RUN_COLUMNS, RUNS, append_rows, remember_machine
-from strainbench.report.versions import UNKNOWN, said_of_older, shown_runs
+from strainbench.report import load_runs
+from strainbench.report.table import older
+from strainbench.report.versions import UNKNOWN, shown_runs
 
 SOLVER = """\
 from dataclasses import dataclass
@@ -51,7 +53,7 @@ def test_what_is_installed_is_shown_and_nothing_is_said(tmp_path, mine):
     remember_machine(tmp_path, "m", describe_machine(1)[1])
     measure(tmp_path, mine, "none", seconds=1)
     assert shown(tmp_path) == [("mine", "1", ""), ("none", "1", "")]
-    assert said_of_older(shown_runs(tmp_path)) == []
+    assert older(load_runs(tmp_path)) == []
 
 
 def test_edited_run_set_back_and_run_again_shows_the_file_as_it_is(tmp_path, mine):
@@ -68,8 +70,8 @@ def test_an_older_row_alone_is_shown_and_said_to_be_older(tmp_path, mine):
     measure(tmp_path, mine, seconds=1)
     mine.write_text(mine.read_text() + "# edited\n")
     assert shown(tmp_path) == [("mine", "1", f"with {mine} before its latest edit")]
-    (line,) = said_of_older(shown_runs(tmp_path))
-    assert line == f"1 of 1 cells were measured with {mine} before its latest edit."
+    (line,) = older(load_runs(tmp_path))
+    assert line == f"1 of 1 cells were measured with {mine} before its latest edit"
 
 
 def test_a_file_that_is_gone_is_said_to_be(tmp_path, mine):

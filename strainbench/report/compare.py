@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,13 @@ from rich import box
 from rich.table import Table
 
 from strainbench import escape
-from strainbench.records import RecordsError, Row, latest_runs, open_folder
+from strainbench.records import RecordsError, Row, open_folder
+from strainbench.report.names import cells, digits
 from strainbench.report.pair import SAME, Pair
+from strainbench.report.versions import shown_runs
 
 MEASURES = ("outcome", "steps_done", "solve_seconds_mean", "max_violation", "relative_gap_max")
-HEADER = ("cells", "limit", "method", "outcome", "A [s]", "B [s]", "B/A", "violation", "gap")
+HEADER = ("mesh", "limit", "method", "outcome", "A [s]", "B [s]", "B/A", "violation", "gap")
 CSV_HEADER = (
     *SAME,
     *(f"{name}_{side}" for name in MEASURES for side in "ab"),
@@ -49,6 +51,8 @@ class Comparison:
             lines.append(
                 f"The machines differ, so times do not compare: A on {here}; B on {there}."
             )
+        elif elsewhere := sum(not p.in_one_place for p in self.matched):
+            lines.append(f"{elsewhere} cells ran on other threads or machines: no ratio of times.")
         changed = sum(a["outcome"] != b["outcome"] for a, b in (p.both for p in self.matched))
         lines.append(
             f"A is {self.names[0]}, B is {self.names[1]}: {len(self.matched)} cells in both, "
@@ -59,21 +63,27 @@ class Comparison:
             mean = float(np.exp(np.log(ratios).mean()))
             lines.append(
                 f"Seconds, B/A: geometric mean {mean:.2f}, from {ratios.min():.2f} to "
-                f"{ratios.max():.2f}, over the {len(ratios)} cells finished in both."
+                f"{ratios.max():.2f}, over the {len(ratios)} cells finished in both, "
+                "on one machine and as many threads."
             )
-        return lines
+        return [*lines, *self._older()]
+
+    def _older(self) -> Iterator[str]:
+        """Which side was measured by code that is not what is installed, and how it differs."""
+        for side, rows in (("A", [p.a for p in self.pairs]), ("B", [p.b for p in self.pairs])):
+            counts = Counter(row["older"] for row in rows if row and row["older"])
+            yield from (f"{n} cells of {side} were measured {how}." for how, n in counts.items())
 
     def _sides(self) -> Iterator[list[Row]]:
         yield from (list(rows) for rows in zip(*(p.both for p in self.matched), strict=True))
 
     def groups(self) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
         """Titles and lines of the tables."""
-        for title, pairs in groupby(sorted(self.matched, key=self._order), lambda p: p.group):
-            yield title, [pair.cells() for pair in pairs]
-
-    def _order(self, pair: Pair) -> int:
-        """Cells of one group side by side, groups in the order of the first folder."""
-        return list(dict.fromkeys(p.group for p in self.matched)).index(pair.group)
+        tables: dict[tuple[str, ...], list[Pair]] = {}
+        for pair in self.matched:
+            tables.setdefault(pair.alike, []).append(pair)
+        for pairs in tables.values():
+            yield pairs[0].group, [pair.cells() for pair in pairs]
 
     def foot(self) -> list[str]:
         """Lines below the tables."""
@@ -81,7 +91,7 @@ class Comparison:
         for pair in self.pairs:
             if not (pair.a and pair.b):
                 side = f"only in {'A' if pair.a else 'B'}"
-                about = f"{side}, {pair.group}, {pair.row['resolution']} cells, {pair.limit}"
+                about = f"{side}, {pair.group}, {cells(pair.mesh)}, {pair.limit}"
                 alone.setdefault(about, []).append(pair.row["solver"])
         return [p.note for p in self.matched if p.note] + [
             f"{about}: {', '.join(solvers)}" for about, solvers in alone.items()
@@ -127,7 +137,7 @@ class Comparison:
 
 
 def compare(first: Path, second: Path) -> Comparison:
-    """The newest rows of both folders, cell by cell, in the order of the first.
+    """The rows that both folders show, cell by cell, in the order of the first.
 
     Raises
     ------
@@ -136,12 +146,13 @@ def compare(first: Path, second: Path) -> Comparison:
     """
     sides = []
     for folder in (first, second):
-        rows = latest_runs(folder).values()
+        rows = shown_runs(folder)
         if not rows:
             raise RecordsError(f"{folder} holds no results to compare")
         sides.append({tuple(row[name] for name in SAME): row for row in rows})
     a, b = sides
-    pairs = [Pair(a.get(key), b.get(key)) for key in dict.fromkeys([*a, *b])]
+    precision = digits(row["scenario_parameters"] for side in sides for row in side.values())
+    pairs = [Pair(a.get(key), b.get(key), precision) for key in dict.fromkeys([*a, *b])]
     return Comparison((str(first), str(second)), pairs)
 
 
@@ -151,4 +162,4 @@ def write_comparison(found: Comparison, path: Path) -> None:
     if path.suffix not in forms:
         raise ValueError(f"-o {path}: a name that ends in {', '.join(forms)} is valid")
     open_folder(path.parent, "-o")
-    path.write_text(forms[path.suffix]())
+    path.write_text(forms[path.suffix](), encoding="utf-8")

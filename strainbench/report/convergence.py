@@ -82,7 +82,7 @@ def write_convergence(folder: Path) -> list[Path]:
     """Write convergence.md, .svg and .png; return their paths."""
     table = load_convergence(folder)
     text = folder / "convergence.md"
-    text.write_text(as_markdown(table, read_machines(folder)))
+    text.write_text(as_markdown(table, read_machines(folder)), encoding="utf-8")
     return [text, *draw_convergence(table, folder / "convergence")]
 
 

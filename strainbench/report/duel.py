@@ -167,4 +167,6 @@ def check_ending(path: Path) -> None:
 def write_outcome(outcome: Outcome, path: Path) -> None:
     """As CSV or Markdown, by what the name ends in."""
     check_ending(path)
-    path.write_text(outcome.csv() if path.suffix == ".csv" else outcome.markdown())
+    path.write_text(
+        outcome.csv() if path.suffix == ".csv" else outcome.markdown(), encoding="utf-8"
+    )

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from strainbench import escape
-from strainbench.records import STEP_COLUMNS, latest_steps
 from strainbench.report.chart import COLOURS, save
+from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits, settings
+from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
 
 PARTS = [
@@ -20,6 +24,8 @@ PARTS = [
     "bending_energy",
     "contact_energy",
 ]
+IN_NAMES = {*SPANNED, MESH_FILE, CURVE_FILE, "step", "integrator"}
+"""Settings that panels and curves are called by anyway."""
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 TABLE = """# Total energy
 
@@ -28,7 +34,8 @@ rest has a small range in its last quarter.
 
 | scene | run | steps | time [s] | first [mJ] | highest | last | range in the last quarter |
 | --- | --- | --- | --- | --- | --- | --- | --- |"""
-LOW = 2.0  # the axis shows energies down to this many times the lowest of the runs that lose energy
+LOW = 2.0  # times the loss of the runs that lose energy: how far below the start the axis goes
+ENDED = "ended after"  # in the names of runs without an answer to the end
 
 
 def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
@@ -37,30 +44,59 @@ def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     Columns: cell, panel and curve (what tells its panel and its curve from others), time [s],
     energy [J].
     """
-    steps = pd.DataFrame(latest_steps(folder), columns=list(STEP_COLUMNS))
+    steps = newest_steps(folder, runs).copy()
     for column in ("step", "time", *PARTS):
         steps[column] = pd.to_numeric(steps[column].replace("nan", ""))
     steps = steps.dropna(subset=["time", "kinetic_energy"]).drop_duplicates(
         ["cell", "step"], keep="last"
     )
-    names = {row["cell"]: _names(row) for _, row in runs.iterrows() if row["mode"] == "simulate"}
-    order = {cell: k for k, cell in enumerate(names)}
-    steps = steps[steps["cell"].isin(names)]
-    steps = steps.assign(order=steps["cell"].map(order)).sort_values(["order", "step"])
-    steps["panel"] = [names[cell][0] for cell in steps["cell"]]
-    steps["curve"] = [names[cell][1] for cell in steps["cell"]]
+    names = _names(runs[runs["mode"] == "simulate"])
+    steps = steps[steps["cell"].isin(names.index)]
+    steps = steps.assign(order=steps["cell"].map({c: k for k, c in enumerate(names.index)}))
+    steps = steps.sort_values(["order", "step"]).join(names, on="cell")
     steps["energy"] = steps[PARTS].sum(axis=1)
     return steps[["cell", "panel", "curve", "time", "energy"]]
 
 
-def _names(row: pd.Series) -> tuple[str, str]:
-    """Panel and curve of a run: the scheme's name, IE where nothing is limited."""
-    settings = json.loads(row["scenario_parameters"])
+def _names(runs: pd.DataFrame) -> pd.DataFrame:
+    """Panel and curve of each cell: the scheme's name, IE where nothing is limited."""
+    precision = digits(runs["scenario_parameters"])
+    settings_apart = apart(runs, IN_NAMES)
+    names = [
+        {"cell": row["cell"], "panel": _panel(row), "curve": _curve(row, precision, others)}
+        for (_, row), others in zip(runs.iterrows(), settings_apart, strict=True)
+    ]
+    table = pd.DataFrame(names, columns=["cell", "panel", "curve"])
+    alike = table.duplicated(["panel", "curve"], keep=False).to_numpy()
+    more = [
+        f", {row['steps_asked']:.0f} steps, tolerance {row['tolerance']:g}"
+        for _, row in runs.iterrows()
+    ]
+    table["curve"] += np.where(alike, more, "").astype(object)
+    table["curve"] += [ended(row) for _, row in runs.iterrows()]
+    return table.set_index("cell")
+
+
+def _panel(row: pd.Series) -> str:
+    limit = f"{row['bound']} limit" if row["bound"] else ""
+    return ", ".join(filter(None, (row["scenario"], cells(row["mesh"]), limit)))
+
+
+def _curve(row: pd.Series, precision: Mapping[str, int], others: str) -> str:
     alone = row["solver"] == UNCONSTRAINED
     scheme = "IE" if alone and row["integrator"] == "sap" else row["integrator"].upper()
-    solver = "" if alone else f", {row['solver']}"
-    panel = f"{row['scenario']}, {row['resolution']:.0f} cells, {100 * row['limit']:g}% limit"
-    return panel, f"{scheme}{solver}, dt = {1000 * settings.get('step', 0):.3g} ms"
+    step = settings(row["scenario_parameters"]).get("step")
+    length = f"dt = {1000 * step:.{precision.get('step', 3)}g} ms" if step else ""
+    return (
+        ", ".join(filter(None, (scheme, "" if alone else row["solver"], length, others)))
+        or UNCONSTRAINED
+    )
+
+
+def ended(row: pd.Series) -> str:
+    """That a run ended early, and when; such a curve ends in a cross."""
+    early = row["steps_done"] < row["steps_asked"]
+    return f", {ENDED} {row['steps_done']:.0f} of {row['steps_asked']:.0f} steps" if early else ""
 
 
 def energy_markdown(folder: Path, runs: pd.DataFrame) -> str:
@@ -83,27 +119,36 @@ def draw_energy(folder: Path, runs: pd.DataFrame) -> list[Path]:
     if table.empty:
         return []
     panels = list(dict.fromkeys(table["panel"]))
-    curves = list(dict.fromkeys(table["curve"]))
-    figure = Figure(figsize=(9.5, 0.6 + 3.2 * len(panels)), layout="constrained")
+    looks = _looks(list(dict.fromkeys(table["curve"])))
+    height = max(0.6 + 3.2 * len(panels), 0.6 + 0.2 * len(looks))
+    figure = Figure(figsize=(9.5, height), layout="constrained")
     for ax, panel in zip(figure.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True):
         shown = table[table["panel"] == panel]
-        for k, curve in enumerate(curves):
-            line = shown[shown["curve"] == curve]
-            ax.plot(
-                line["time"],
-                1000 * line["energy"],
-                color=COLOURS[k % len(COLOURS)],
-                linestyle=DASHES[k // len(COLOURS) % len(DASHES)],
-                linewidth=1.4,
-                label=escape.chart(curve),
-            )
+        for _, line in shown.groupby("cell", sort=False):
+            curve, energy = line["curve"].iloc[0], 1000 * line["energy"]
+            ax.plot(line["time"], energy, **looks[curve])
+            if ENDED in curve or len(line) == 1:
+                ax.plot(line["time"].iloc[-1], energy.iloc[-1], "x", color=looks[curve]["color"])
         start = 1000 * float(shown.groupby("cell")["energy"].first().max())
         lowest = 1000 * float(shown.groupby("cell")["energy"].min().median())
-        ax.set_ylim(LOW * min(lowest, start - 1e-9), start + abs(lowest - start))
+        drop = max(start - lowest, 1e-9)
+        ax.set_ylim(start - LOW * drop, start + drop)
         ax.set_title(escape.chart(panel), size=10)
         ax.set_xlabel("time [s]")
         ax.set_ylabel("total energy [mJ]")
         ax.grid(visible=True, color="#dddddd", linewidth=0.6)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right upper", frameon=False, fontsize=9)
+    handles = [Line2D([], [], label=escape.chart(curve), **look) for curve, look in looks.items()]
+    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9)
     return save(figure, folder / "energy")
+
+
+def _looks(curves: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """A colour and dashes for each curve, the same in all panels."""
+    return {
+        curve: {
+            "color": COLOURS[k % len(COLOURS)],
+            "linestyle": DASHES[k // len(COLOURS) % len(DASHES)],
+            "linewidth": 1.4,
+        }
+        for k, curve in enumerate(curves)
+    }

@@ -16,8 +16,9 @@ import pandas as pd
 
 from strainbench import escape
 from strainbench.discovery import find_scenario
-from strainbench.records import latest_steps
 from strainbench.referee import OUTCOMES
+from strainbench.report.numbers import distance_text
+from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED, machine_line, power
 
 EXPLANATION = """\
@@ -46,7 +47,7 @@ class Case:
 
 def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """A line for each method on each hard case of a results folder; see COLUMNS."""
-    says, cases = _statuses(folder), _cases(runs)
+    says, cases = _statuses(folder, runs), _cases(runs)
     keys = ["scenario_parameters", "solver", *RUN]
     by_key = {tuple(row[keys]): row for _, row in runs.iterrows()}
     lines = []
@@ -75,13 +76,10 @@ def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(lines, columns=list(COLUMNS))
 
 
-def _statuses(folder: Path) -> dict[tuple[str, str], str]:
+def _statuses(folder: Path, runs: pd.DataFrame) -> dict[tuple[str, str], str]:
     """What the solver says of a cell's projections of each outcome."""
-    latest = {(r["cell"], r["projection"]): r for r in latest_steps(folder)}
-    found: dict[tuple[str, str], set[str]] = {}
-    for row in latest.values():
-        found.setdefault((row["cell"], row["outcome"]), set()).add(row["status"])
-    return {key: ", ".join(sorted(statuses)) for key, statuses in found.items()}
+    alike = newest_steps(folder, runs).groupby(["cell", "outcome"])["status"]
+    return {key: ", ".join(sorted(set(statuses))) for key, statuses in alike}
 
 
 def _cases(runs: pd.DataFrame) -> dict[str, Case]:
@@ -120,8 +118,9 @@ def _judge(row: pd.Series, status: str) -> tuple[str, str]:
     if row["outcome"] == "optimal":
         return PASSED, ""
     if row["outcome"] == "feasible":
-        distance = f"{1000 * row['distance_max']:.2g} mm"
-        return PARTLY, f"gap {power(row['relative_gap_max'])}, {distance}"
+        if pd.isna(row["relative_gap_max"]):
+            return PARTLY, "local"
+        return PARTLY, f"gap {power(row['relative_gap_max'])}, {distance_text(row)} mm"
     if row["outcome"] == "violated":
         return FAILED, f"violated by {power(row['max_violation'])}, says {status}"
     return FAILED, f"no answer, says {status}" if status else row["reason"].split(" (")[0]

@@ -11,12 +11,16 @@ from markupsafe import Markup
 
 from strainbench import escape
 from strainbench.report import warm
+from strainbench.report.numbers import seconds_text
 from strainbench.report.table import (
+    OLDER,
+    REASONS,
     accuracy_text,
     details,
     explanation,
     groups,
-    ledger,
+    ledger_lines,
+    older,
     reasons,
     time_text,
 )
@@ -39,15 +43,19 @@ def write_page(
     page = environment.get_template("page.html").render(
         charts=[Markup(svg[svg.index("<svg") :]) for svg in drawings],
         explanation=explanation(runs).replace("`", "").replace("**", ""),
+        older_title=OLDER.replace("`", ""),
+        older=[escape.plain(line) for line in older(runs)],
         groups=list(groups(runs)),
         twins=[pair.line() for pair in warm.pairs(runs)],
         twins_header=warm.HEADER,
         twins_explanation=warm.EXPLANATION.replace("`", ""),
         time_text=time_text,
         accuracy_text=accuracy_text,
+        seconds_text=seconds_text,
+        reasons_title=REASONS,
         reasons=[escape.plain(reason) for reason in reasons(runs)],
         details=details(runs),
-        ledger=ledger(runs).itertuples(index=False),
+        ledger=ledger_lines(runs),
         machines=machines,
     )
     path.write_text(page, encoding="utf-8")

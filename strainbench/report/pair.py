@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
 from strainbench.records import Row
-from strainbench.report.table import UNCONSTRAINED, describe, power
+from strainbench.report.names import (
+    SPANNED,
+    cells,
+    describe,
+    digits,
+    limit_name,
+    mesh_name,
+    settings,
+)
+from strainbench.report.numbers import seconds_text
+from strainbench.report.table import UNCONSTRAINED, power
 
 SAME = (
     "scenario",
@@ -17,16 +27,25 @@ SAME = (
     "resolution",
     "limit",
     "solver",
+    "threads",
 )
 """What the rows of one cell share; machine and the settings behind a solver's name may differ."""
+PLACE = ("machine", "blas_threads")
+"""What they must share for their times to compare."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """One cell's rows in the two folders; None in the folder that has none."""
+    """One cell's rows in the two folders; None in the folder that has none.
+
+    Parameters
+    ----------
+    digits : that tell the values of each setting apart
+    """
 
     a: Row | None
     b: Row | None
+    digits: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def row(self) -> Row:
@@ -39,27 +58,56 @@ class Pair:
     def group(self) -> str:
         """What a table has in its title."""
         r = self.row
-        about = describe(r["scenario_parameters"], ("resolution", "limit"))
-        last = f"tolerance {float(r['tolerance']):g}, {r['steps_asked']} steps"
+        about = describe(r["scenario_parameters"], SPANNED, self.digits)
+        last = f"tolerance {float(r['tolerance']):.10g}, {r['steps_asked']} steps"
         return ", ".join(part for part in (r["scenario"], r["mode"], about, last) if part)
 
     @property
+    def alike(self) -> tuple[str, ...]:
+        """What the cells of a table share, to the last digit."""
+        r = self.row
+        exact = {k: v for k, v in settings(r["scenario_parameters"]).items() if k not in SPANNED}
+        return (r["scenario"], r["mode"], str(exact), r["tolerance"], r["steps_asked"])
+
+    @property
     def limit(self) -> str:
-        """In percent."""
-        return f"{100 * float(self.row['limit']):g}%" if self.row["limit"] else ""
+        """In percent, or the file of its curve."""
+        return limit_name(self.row["scenario_parameters"], _number(self.row["limit"]))
+
+    @property
+    def mesh(self) -> str:
+        """Its cells, or its file."""
+        r = self.row
+        known = [row["constraints"] for row in (self.a, self.b) if row and row["constraints"]]
+        numbers = (_number(r["resolution"]), _number("".join(known[:1])))
+        return mesh_name(r["scenario_parameters"], *numbers, r["directions"])
 
     @property
     def title(self) -> str:
         """The cell in one line."""
-        return f"{self.row['resolution']} cells, {self.limit}, {self.row['solver']} ({self.group})"
+        return f"{cells(self.mesh)}, {self.limit}, {self.row['solver']} ({self.group})"
+
+    @property
+    def comparable(self) -> bool:
+        """Whether times compare: a solver's, both with all steps, on one machine, threads alike."""
+        if not (self.a and self.b) or self.row["solver"] == UNCONSTRAINED:
+            return False
+        return self.in_one_place and all(
+            r["steps_done"] == r["steps_asked"] and r["outcome"] != "no answer" for r in self.both
+        )
+
+    @property
+    def in_one_place(self) -> bool:
+        """Whether both ran on one machine, on as many threads."""
+        before, after = ([row[name] for name in PLACE] for row in self.both)
+        return before == after
 
     @property
     def ratio(self) -> float:
-        """Seconds a solve in B over those in A; NaN unless both did all their steps."""
-        unsolved = not (self.a and self.b) or self.row["solver"] == UNCONSTRAINED
-        if unsolved or any(r["steps_done"] != r["steps_asked"] for r in self.both):
+        """Seconds a solve in B over those in A; NaN unless these compare."""
+        if not self.comparable:
             return float("nan")
-        before, after = (float(r["solve_seconds_mean"] or "nan") for r in self.both)
+        before, after = (_number(r["solve_seconds_mean"]) for r in self.both)
         return after / before if before > 0 else float("nan")
 
     @property
@@ -74,14 +122,15 @@ class Pair:
         """Which settings differ behind the solver's name."""
         if not (self.a and self.b) or self.a["solver_parameters"] == self.b["solver_parameters"]:
             return ""
-        before, after = (describe(r["solver_parameters"]) or "none" for r in self.both)
+        texts = [r["solver_parameters"] for r in self.both]
+        before, after = (describe(text, (), digits(texts)) or "none" for text in texts)
         return f"settings differ, {self.title}: {before} in A, {after} in B"
 
     def cells(self) -> tuple[str, ...]:
         """A line of the table; what changed reads "before → after"."""
-        times = [f"{float(s):.4f}" if (s := r["solve_seconds_mean"]) else "-" for r in self.both]
+        times = [seconds_text(_number(r["solve_seconds_mean"])) or "-" for r in self.both]
         return (
-            self.row["resolution"],
+            self.mesh,
             self.limit,
             self.row["solver"],
             self._change(_outcome),
@@ -98,6 +147,11 @@ class Pair:
 def _outcome(row: Row) -> str:
     cut_off = row["steps_done"] != row["steps_asked"]
     return row["outcome"] + (f" ({row['steps_done']}/{row['steps_asked']})" if cut_off else "")
+
+
+def _number(text: str) -> float:
+    """A number of a row, NaN where there is none."""
+    return float(text or "nan")
 
 
 def _power(text: str) -> str:

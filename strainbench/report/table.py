@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
@@ -11,18 +12,24 @@ import pandas as pd
 
 from strainbench import escape
 from strainbench.report import warm
+from strainbench.report.names import digits_of
+from strainbench.report.numbers import distance_text, seconds_text
 
-GROUP = ["scenario", "mode", "setting", "tolerance", "steps_asked"]
+GROUP = ["scenario", "mode", "exact", "tolerance", "steps_asked", "threads"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
 EXPLANATION = """\
 Seconds are means over projections of the time inside the solver, set-up apart, measured by the
 suite. `*`: some steps did not converge (the referee finds a violation above {violation}) or the
 cell's time ran out, the steps done in brackets and the time spent on the last one counted as far
 as it went; `-`: no usable answer. Beside each time stands
-what the referee found, at its worst over all steps: largest violation, relative gap to the
-certified lower bound, largest distance of a vertex from the reference optimum in mm, itself
-certified to within {error:.1g} mm. **Bold**:
-optimal on every step (violation at most {violation}, relative gap at most {gap})."""
+what the referee found, at its worst over all steps done: largest violation, relative gap to the
+certified lower bound, largest distance of a vertex from the reference optimum in mm{error}.
+**Bold**: optimal on every step (violation at most {violation}, relative gap at most {gap})."""
+CERTIFIED = """,
+itself certified to within {error:.1g} mm or, for most cells, better: `<` is a bound on a distance
+that is smaller than what its own cell's reference is certified to"""
+OLDER = "Older than what is installed, and to be had anew with `strainbench run ... --rerun`:"
+REASONS = "What kept a cell from optimal, or from what its scene is about"
 LOCAL = """
 *Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
 What such an answer is worth stands below: whether it is a local optimum, by the residual of the
@@ -31,51 +38,50 @@ KKT conditions, and its objective beside the best known."""
 
 @dataclass(frozen=True)
 class Group:
-    """The rows of one table: all alike but for resolution, limit and solver."""
+    """The rows of one table: all alike but for mesh, limit and solver."""
 
     title: str
     runs: pd.DataFrame
 
     @property
-    def resolutions(self) -> list[int]:
-        """In rising order."""
-        return sorted(int(r) for r in self.runs["resolution"].unique())
+    def meshes(self) -> list[str]:
+        """The finer the later."""
+        return list(self.runs.sort_values(["resolution", "mesh"])["mesh"].unique())
+
+    @property
+    def limits(self) -> list[str]:
+        """The looser the later."""
+        return list(self.runs.sort_values(["limit", "bound"])["bound"].unique())
 
     def blocks(self) -> Iterator[tuple[str, str, list[pd.Series | None]]]:
-        """(limit, solver, row or None for each resolution), implicit Euler left out."""
+        """(limit, solver, row or None for each mesh), implicit Euler left out."""
         constrained = self.runs[self.runs["solver"] != UNCONSTRAINED]
-        for limit, block in constrained.groupby("limit"):
+        for limit in self.limits:
+            block = constrained[constrained["bound"] == limit]
             for solver in warm.beside_twins(list(block["solver"].unique())):
                 rows = block[block["solver"] == solver]
-                by_resolution = {int(r["resolution"]): r for _, r in rows.iterrows()}
-                yield (
-                    f"{100 * limit:g}%",
-                    solver,
-                    [by_resolution.get(n) for n in self.resolutions],
-                )
+                by_mesh = {r["mesh"]: r for _, r in rows.iterrows()}
+                yield limit, solver, [by_mesh.get(name) for name in self.meshes]
 
     def implicit_euler(self) -> list[float]:
-        """Mean seconds a step of unconstrained implicit Euler; NaN where it did not run."""
-        alone = self.runs[self.runs["solver"] == UNCONSTRAINED]
-        means = alone.groupby("resolution")["ie_seconds_mean"].mean()
-        return [float(means.get(n, float("nan"))) for n in self.resolutions]
-
-
-def describe(parameters: str, without: tuple[str, ...] = ()) -> str:
-    """Settings from their JSON, on a line."""
-    return ", ".join(
-        f"{key} {value:.4g}" if isinstance(value, float) else escape.plain(f"{key} {value}")
-        for key, value in json.loads(parameters or "{}").items()
-        if key not in without
-    )
+        """Mean seconds a step of unconstrained implicit Euler, NaN for a mesh on which it did not
+        run to its end; nothing where it did on none, or where there is no physics."""
+        ran = self.runs[(self.runs["solver"] == UNCONSTRAINED) & (self.runs["ie_seconds_mean"] > 0)]
+        means = (
+            ran[ran["steps_done"] == ran["steps_asked"]].groupby("mesh")["ie_seconds_mean"].mean()
+        )
+        return [float(means.get(n, float("nan"))) for n in self.meshes] if len(means) else []
 
 
 def groups(runs: pd.DataFrame) -> Iterator[Group]:
     """The tables of a results folder."""
-    for key, rows in runs.groupby(GROUP, sort=False, dropna=False):
-        scenario, mode, setting, tolerance, steps = key
-        title = f"{scenario}, {mode}, {setting}, tolerance {tolerance:g}, {steps} steps"
-        yield Group(title, rows)
+    precision = digits_of(runs["tolerance"])
+    for _, rows in runs.groupby(GROUP, sort=False, dropna=False):
+        first = rows.iloc[0]
+        aim = f"tolerance {first['tolerance']:.{precision}g}, {first['steps_asked']:.0f} steps"
+        many = f"{first['threads']:.0f} threads" if first["threads"] > 1 else ""
+        parts = (first["scenario"], first["mode"], first["setting"], aim, many)
+        yield Group(", ".join(filter(None, parts)), rows)
 
 
 def mark(row: pd.Series) -> str:
@@ -94,12 +100,12 @@ def time_text(row: pd.Series | None) -> str:
         return "-"
     steps = row["steps_asked"] - row["steps_done"]
     done = f" ({row['steps_done']:.0f}/{row['steps_asked']:.0f})" if steps else ""
-    return f"{mark(row)}{row['solve_seconds_mean']:.4f}{done}"
+    return f"{mark(row)}{seconds_text(row['solve_seconds_mean'])}{done}"
 
 
 def accuracy_text(row: pd.Series | None) -> str:
     """Violation, relative gap, distance in mm."""
-    if row is None or pd.isna(row["max_violation"]):
+    if row is None or mark(row) == "-" or pd.isna(row["max_violation"]):
         return ""
     if pd.isna(row["relative_gap_max"]):
         return f"{power(row['max_violation'])} · local"
@@ -107,7 +113,7 @@ def accuracy_text(row: pd.Series | None) -> str:
         (
             power(row["max_violation"]),
             power(row["relative_gap_max"]),
-            f"{1000 * row['distance_max']:.2g}",
+            distance_text(row),
         )
     )
 
@@ -119,43 +125,65 @@ def power(value: float) -> str:
 
 def tidy(runs: pd.DataFrame) -> pd.DataFrame:
     """One line a cell, for further processing."""
-    table = runs[[*GROUP, "resolution", "limit", "solver"]].copy()
+    named = [name.replace("exact", "setting") for name in GROUP]
+    table = runs[[*named, "resolution", "limit", "solver"]].copy()
     table["seconds"] = runs["solve_seconds_mean"]
     table["mark"] = [mark(row) for _, row in runs.iterrows()]
-    for column in ("ie_seconds_mean", "outcome", "max_violation", "relative_gap_max"):
+    table["ie_seconds_mean"] = runs["ie_seconds_mean"].where(runs["ie_seconds_mean"] > 0)
+    for column in ("outcome", "max_violation", "relative_gap_max"):
         table[column] = runs[column]
     table["distance_mm"] = 1000 * runs["distance_max"]
+    table["reference_error_mm"] = 1000 * runs["reference_error_max"]
     for column in ("max_principal_stretch", "iterations_mean", "steps_done", "reason", "machine"):
         table[column] = runs[column]
+    table["mesh"] = runs["mesh"]
+    table["older"] = runs["older"]
     return table
 
 
 def explanation(runs: pd.DataFrame) -> str:
     """What the signs of a table mean."""
     thresholds = runs.iloc[0]
-    errors = runs["reference_error_max"].replace(np.inf, np.nan)  # of infeasible frames
+    errors = runs["reference_error_max"].replace(np.inf, np.nan).dropna()  # of infeasible frames
     local = runs["max_violation"].notna() & runs["relative_gap_max"].isna()
     return EXPLANATION.format(
         violation=thresholds["violation_threshold"],
         gap=thresholds["gap_threshold"],
-        error=1000 * np.nan_to_num(errors.max()),
+        error=CERTIFIED.format(error=1000 * errors.max()) if len(errors) else "",
     ) + (LOCAL if local.any() else "")
 
 
+def scene(row: pd.Series) -> str:
+    """A row's scene, with its mesh, its limit, and what tells it from others of the folder."""
+    name = f"{row['scenario']} {row['mesh']}"
+    return ", ".join(
+        filter(None, (f"{name} at {row['bound']}" if row["bound"] else name, row["apart"]))
+    )
+
+
 def reasons(runs: pd.DataFrame) -> list[str]:
-    """A line for each cell that is not optimal on every step."""
+    """A line for each cell that is not optimal on every step, or not what its scene is about."""
     return [
-        f"{r['scenario']} {r['resolution']:.0f} at {100 * r['limit']:g}%, {r['mode']}, "
-        f"{r['solver']}: {r['outcome']}; {r['reason']}"
+        f"{scene(r)}, {r['mode']}, {r['solver']}: {r['outcome']}; {r['reason']}"
         for _, r in runs.iterrows()
         if r["reason"] and r["solver"] != UNCONSTRAINED
     ]
 
 
+def older(runs: pd.DataFrame) -> list[str]:
+    """A line for each way in which rows are older than what is installed, and which these are."""
+    lines = []
+    for how, rows in runs[runs["older"] != ""].groupby("older", sort=False):
+        names = [f"{scene(r)}, {r['solver']}" for _, r in rows.iterrows()]
+        which = "" if len(rows) == len(runs) else f": {'; '.join(names)}"
+        lines.append(f"{len(rows)} of {len(runs)} cells were measured {how}{which}")
+    return lines
+
+
 def details(runs: pd.DataFrame) -> list[str]:
     """A line for each cell whose solver tells more of its time, such as a modelling layer's."""
     return [
-        f"{r['solver']}, {r['scenario']} {r['resolution']:.0f} at {100 * r['limit']:g}%: "
+        f"{r['solver']}, {scene(r)}: "
         + ", ".join(
             f"{k.replace('_', ' ')} {v:.4f}" for k, v in json.loads(r["details_mean"]).items()
         )
@@ -167,31 +195,43 @@ def details(runs: pd.DataFrame) -> list[str]:
 def ledger(runs: pd.DataFrame) -> pd.DataFrame:
     """What each scene models: physics, unknowns, constraints, most active ones, non-zeros."""
     sizes = ["variables", "constraints", "active_constraints_max", "nonzeros"]
-    keys = ["scenario", "needs", "resolution", "directions"]
-    return runs.dropna(subset=["variables"]).groupby(keys, sort=False)[sizes].max().reset_index()
+    same = ["scenario", "needs", "mesh", "directions", "variables", "constraints", "nonzeros"]
+    known = runs.dropna(subset=["variables"]).groupby(same, sort=False, dropna=False)
+    return known["active_constraints_max"].max().reset_index()[[*same[:4], *sizes]]
+
+
+def ledger_lines(runs: pd.DataFrame) -> list[list[str]]:
+    """The same as text."""
+    return [[_size(value) for value in line] for line in ledger(runs).itertuples(index=False)]
 
 
 def _ledger_markdown(runs: pd.DataFrame) -> str:
-    names = ["scene", "physics it needs", "cells", "directions", "variables", "constraints"]
+    names = ["scene", "physics it needs", "mesh", "directions", "variables", "constraints"]
     header = [*names, "active at most", "non-zeros"]
     lines = [_line(header), _line(["---"] * len(header))]
-    for values in ledger(runs).itertuples(index=False):
-        lines.append(
-            _line([f"{v:.0f}" if isinstance(v, float) else escape.markdown(v) for v in values])
-        )
+    lines += [_line([escape.markdown(v) for v in values]) for values in ledger_lines(runs)]
     return "## Model ledger\n\n" + "\n".join(lines)
+
+
+def _size(value: object) -> str:
+    """A number of a ledger, or a name; nothing for NaN."""
+    if not isinstance(value, float):
+        return str(value)
+    return "" if pd.isna(value) else f"{value:.0f}"
 
 
 def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
     """All tables, what their signs mean, the reasons of every failure, the machine."""
     parts = ["# Table 1: seconds a projection, and the accuracy reached", explanation(runs)]
+    if lines := [f"- {escape.markdown(line)}" for line in older(runs)]:
+        parts.append(f"{OLDER}\n\n" + "\n".join(lines))
     parts += [_markdown_group(group) for group in groups(runs)]
     if twins := warm.pairs(runs):
         lines = [_line(list(warm.HEADER)), _line(["---"] * len(warm.HEADER))]
         lines += [_line([escape.markdown(text) for text in pair.line()]) for pair in twins]
         parts.append("## Cold and warm starts\n\n" + warm.EXPLANATION + "\n\n" + "\n".join(lines))
     if lines := [f"- {escape.markdown(reason)}" for reason in reasons(runs)]:
-        parts.append("## What kept a cell from optimal\n\n" + "\n".join(lines))
+        parts.append(f"## {REASONS}\n\n" + "\n".join(lines))
     if lines := [f"- {escape.markdown(line)}" for line in details(runs)]:
         parts.append("## Inside the solve, means\n\n" + "\n".join(lines))
     parts.append(_ledger_markdown(runs))
@@ -201,18 +241,17 @@ def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
 
 def _markdown_group(group: Group) -> str:
     header = ["limit", "method"]
-    for n in group.resolutions:
-        header += [f"{n}×{n} [s]", "violation · gap · mm"]
+    for name in group.meshes:
+        header += [f"{escape.markdown(name)} [s]", "violation · gap · mm"]
     lines = [f"## {escape.markdown(group.title)}", "", _line(header), _line(["---"] * len(header))]
-    euler = group.implicit_euler()
-    cells = [f"{s:.4f}" if s == s else "" for s in euler]  # not NaN
-    lines.append(_line(["", "implicit Euler", *(t for c in cells for t in (c, ""))]))
+    if cells := [seconds_text(seconds) for seconds in group.implicit_euler()]:
+        lines.append(_line(["", "implicit Euler", *(t for c in cells for t in (c, ""))]))
     for limit, solver, rows in group.blocks():
         texts = []
         for row in rows:
             bold = "**" if row is not None and row["outcome"] == "optimal" else ""
             texts += [f"{bold}{time_text(row)}{bold}", accuracy_text(row)]
-        lines.append(_line([limit, escape.markdown(solver), *texts]))
+        lines.append(_line([escape.markdown(limit), escape.markdown(solver), *texts]))
     return "\n".join(lines)
 
 
@@ -231,18 +270,22 @@ def machine_line(name: str, facts: Mapping[str, object]) -> str:
     )
 
 
+def _latex_mesh(name: str) -> str:
+    return re.sub(r"^(\d+)\\texttimes\{\}(\d+)$", r"$\1\\times\2$", escape.latex(name))
+
+
 def as_latex(runs: pd.DataFrame) -> str:
     """The times alone, as tabulars in the paper's shape."""
     parts = []
     for group in groups(runs):
-        columns = " & ".join(rf"${n}\times{n}$" for n in group.resolutions)
+        columns = " & ".join(_latex_mesh(name) for name in group.meshes)
         lines = [
             f"% {escape.plain(group.title)}",
-            rf"\begin{{tabular}}{{ll{'r' * len(group.resolutions)}}}",
+            rf"\begin{{tabular}}{{ll{'r' * len(group.meshes)}}}",
             rf"limit & method & {columns} \\ \hline",
         ]
-        euler = [f"{s:.3f}\\,s" if s == s else "" for s in group.implicit_euler()]
-        lines.append(" & ".join(["", "implicit Euler", *euler]) + r" \\")
+        if euler := [seconds_text(seconds) for seconds in group.implicit_euler()]:
+            lines.append(" & ".join(["", "implicit Euler", *euler]) + r" \\")
         for limit, solver, rows in group.blocks():
             texts = [time_text(r) for r in rows]
             lines.append(" & ".join([escape.latex(limit), escape.latex(solver), *texts]) + r" \\")

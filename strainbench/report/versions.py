@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
@@ -19,7 +18,10 @@ from strainbench.records import Row, latest_runs, read_machines
 from strainbench.sources import ROOT, suite_digest
 
 PLUGINS = ("scenario", "solver")
-SAME = ("scenario", "scenario_parameters", "solver_parameters", "mode", "steps_asked", "tolerance")
+SAME = (
+    *("scenario", "resolution", "limit", "scenario_parameters", "solver_parameters"),
+    *("mode", "steps_asked", "tolerance"),
+)
 UNKNOWN = "by another version of strainbench"
 
 
@@ -39,18 +41,13 @@ def shown_runs(folder: Path) -> list[Row]:
         if before is None or before["older"] or not row["older"]:
             kept[_subject(row)] = row
     for row in kept.values():
-        row["older"] = row["older"] or _older_suite(row, machines.get(row["machine"], {}))
+        facts = machines.get(row["machine"], {})
+        row["older"] = row["older"] or _older_suite(row, facts)
+        row["threads"] = row["threads"] or str(facts.get("threads_per_solver", 1))
     rows = list(kept.values())
     for name in ("solver", "scenario"):
         _tell_apart(rows, name)
     return rows
-
-
-def said_of_older(rows: Iterable[Mapping[str, str]]) -> list[str]:
-    """A line for each way in which rows are older than what is installed."""
-    rows = list(rows)
-    counts = Counter(row["older"] for row in rows if row["older"])
-    return [f"{n} of {len(rows)} cells were measured {older}." for older, n in counts.items()]
 
 
 def _subject(row: Row) -> tuple[str, ...]:

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from strainbench.report.numbers import distance_text
+
 HEADER = ("scene", "limit", "method", "seconds, cold / warm", "iterations", "distance [mm]")
 EXPLANATION = """\
-Ratio of the medians of seconds a projection, cold over warm; mean iterations and largest distance
-to the optimum, cold and warm. In `simulate` each start has frames of its own, in `replay` both
-have the same."""
+Ratio of the medians of seconds a projection, cold over warm, where both did all steps within the
+limits, else the two outcomes; mean iterations and largest distance to the optimum, cold and warm.
+In `simulate` each start has frames of its own, in `replay` both have the same."""
 SUFFIX = "-warm"
 
 
@@ -26,16 +28,25 @@ class Pair:
         """The entries of HEADER."""
         cold, warm = self.cold, self.warm
         ratio = cold["solve_seconds_median"] / warm["solve_seconds_median"]
-        iterations = [f"{r['iterations_mean']:.4g}" for r in (cold, warm)]
-        distances = [f"{1000 * r['distance_max']:.2g}" for r in (cold, warm)]
+        useful = all(r["outcome"] in ("optimal", "feasible") for r in (cold, warm))
+        iterations = [_number(r["iterations_mean"]) for r in (cold, warm)]
+        scene = (f"{cold['scenario']} {cold['mesh']}", cold["apart"], cold["mode"])
         return (
-            f"{cold['scenario']} {cold['resolution']:.0f}, {cold['mode']}",
-            f"{100 * cold['limit']:g}%",
+            ", ".join(filter(None, scene)),
+            cold["bound"],
             str(cold["solver"]),
-            f"{ratio:.2f}",
+            f"{ratio:.2f}" if useful and ratio > 0 else self._outcomes(),
             " → ".join(iterations),
-            " → ".join(distances),
+            " → ".join(distance_text(r) for r in (cold, warm)),
         )
+
+    def _outcomes(self) -> str:
+        """What there is instead of a ratio."""
+        return " → ".join(str(r["outcome"]) for r in (self.cold, self.warm))
+
+
+def _number(value: float) -> str:
+    return "-" if pd.isna(value) else f"{value:.4g}"
 
 
 def starts_warm(run: pd.Series) -> bool:
@@ -44,11 +55,10 @@ def starts_warm(run: pd.Series) -> bool:
 
 
 def pairs(runs: pd.DataFrame) -> list[Pair]:
-    """The cells that ran both ways, to the end."""
+    """The cells that ran both ways."""
     same = ["scenario", "mode", "scenario_parameters", "tolerance", "steps_asked"]
-    done = runs[runs["steps_done"] == runs["steps_asked"]]
-    cold = {(*r[same], r["solver"]): r for _, r in done.iterrows() if not starts_warm(r)}
-    warm = [r for _, r in done.iterrows() if starts_warm(r)]
+    cold = {(*r[same], r["solver"]): r for _, r in runs.iterrows() if not starts_warm(r)}
+    warm = [r for _, r in runs.iterrows() if starts_warm(r)]
     keys = [(*r[same], r["solver"].removesuffix(SUFFIX)) for r in warm]
     return [Pair(cold[k], r) for k, r in zip(keys, warm, strict=True) if k in cold]
 
