@@ -27,6 +27,7 @@ from strainbench import __version__
 from strainbench.cell import Cell
 from strainbench.discovery import Entry, list_scenarios, list_solvers
 from strainbench.export import check_format, write_problem
+from strainbench.folder import disk_errors
 from strainbench.frame import record, record_all, recorded, recorder
 from strainbench.machine import describe_machine, fixed_threads
 from strainbench.plan import never_warm, plan, plan_one, plan_scene
@@ -167,7 +168,9 @@ def report(
     """Write tables (CSV, Markdown, LaTeX), charts and an HTML page from results."""
     from strainbench.report import write_report  # pandas and matplotlib only where needed
 
-    for path in write_report(results):
+    with disk_errors(results):
+        paths = write_report(results)
+    for path in paths:
         console.print(f"wrote {path}", highlight=False)
 
 
