@@ -29,6 +29,7 @@ from strainbench.cell import Cell
 from strainbench.discovery import list_scenarios, told
 from strainbench.escape import plain, terminal
 from strainbench.export import check_format, write_problem
+from strainbench.folder import disk_errors
 from strainbench.frame import record, record_all, recorded, recorder
 from strainbench.listing import tables
 from strainbench.machine import describe_machine, fixed_threads
@@ -253,7 +254,9 @@ def report(
     """Write tables (CSV, Markdown, LaTeX), charts and an HTML page from results."""
     from strainbench.report import write_report  # pandas and matplotlib only where needed
 
-    for written in write_report(results):
+    with disk_errors(results):
+        paths = write_report(results)
+    for written in paths:
         say(f"wrote {written}")
 
 

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from strainbench.converge import converge
+from strainbench.folder import locked
 from strainbench.plan import plan
 from strainbench.records import (
     RUN_COLUMNS,
@@ -19,6 +21,7 @@ from strainbench.records import (
     STEP_COLUMNS,
     STEPS,
     DiskError,
+    RecordsError,
     latest_runs,
     read_rows,
     write_rows,
@@ -143,6 +146,21 @@ def test_an_interrupt_as_a_row_is_written_neither_doubles_nor_loses_it(tmp_path)
     assert len(read_rows(tmp_path / RUNS, RUN_COLUMNS)) == 1
     assert len(read_rows(tmp_path / STEPS, STEP_COLUMNS)) == 2
     assert Runner(Settings(tmp_path)).run(cells()).cells == 0
+
+
+def test_convergence_is_not_written_beside_another_run(tmp_path):
+    following = converge([], None, 1, tmp_path, 1.0)
+    with locked(tmp_path), pytest.raises(RecordsError, match="is in use by process"):
+        next(following)
+
+
+def test_a_report_that_cannot_be_written_is_a_line_and_status_1(tmp_path):
+    write_rows(tmp_path / RUNS, RUN_COLUMNS, [run_row(scenario_parameters="{}")])
+    (tmp_path / "table1.csv").mkdir()
+    done = strainbench(tmp_path, "report", "--results", str(tmp_path))
+    assert done.returncode == 1
+    assert f"{tmp_path / 'table1.csv'}: Is a directory" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_our_text_files_name_their_encoding():
