@@ -55,8 +55,9 @@ class Ipopt(Solver):
     ----------
     scaling : "default" is the problem in metres with Ipopt's own options: a tolerance of 1e-8
         (`tolerance` is not used), 3000 iterations. The initial barrier parameter of 0.1 then
-        dwarfs an objective of 1e-3 m^2 and throws the cloth far from the target; where it does
-        come back, 1e-8 is too loose for multipliers of 1e-6.
+        dwarfs an objective of 1e-3 m^2 and throws the cloth far from the target. With the exact
+        Hessian it does not come back in time; with L-BFGS (`-default-lbfgs`) it does, but there
+        1e-8 is too loose for small multipliers, and the first answers have gaps of 5e-2 to 0.4.
         "scaled" takes lengths in edge lengths h and s = 10 / h^2 (over the mean mass), an
         adaptive barrier parameter, constraints not relaxed, and a hundredth of `tolerance`.
         Tuned on frames 1 to 11 of the swing at 10, 20 and 40 cells, limits 1% and 10%: at
@@ -68,7 +69,8 @@ class Ipopt(Solver):
         1%, 21 iterations become 14 (medians). The other `warm_start` options are Ipopt's own: at
         10 cells points pushed inside by 1e-2 to 1e-4 take 10 iterations, by 1e-6 14, and the
         monotone barrier strategy, from 1e-2 to 1e-5, 11 to 22.
-    hessian : "exact", or "limited-memory" for Ipopt's L-BFGS.
+    hessian : "exact", or "limited-memory" for Ipopt's L-BFGS. Variants have the exact one unless
+        they end in `-lbfgs`.
     """
 
     name = "ipopt"

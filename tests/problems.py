@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from strainbench import Problem, StretchLimits
+from strainbench.mesh import square_grid
 from strainbench.reference import verify
 
 
@@ -106,6 +107,58 @@ def random_placed_problem(
 def random_problem(rng, **choices):
     """See `random_placed_problem`."""
     return random_placed_problem(rng, **choices)[0]
+
+
+def hard_mesh(rng):
+    """Irregular triangles, a square sheet, slivers down to 1e-3 of their length, or a volume."""
+    kind = int(rng.integers(4))
+    if kind == 0:
+        return random_mesh(rng)
+    if kind == 1:
+        return square_grid(int(rng.integers(2, 13)), 10 ** rng.uniform(-1, 0.5), "alternating")
+    if kind == 2:
+        points = rng.uniform(size=(int(rng.integers(6, 60)), 2)) * [1, 10 ** rng.uniform(-3, 0)]
+    else:
+        points = rng.normal(size=(int(rng.integers(5, 25)), 3))
+    elements = Delaunay(points).simplices.astype(np.int64)
+    used, compact = np.unique(elements, return_inverse=True)
+    return points[used], compact.reshape(elements.shape)
+
+
+def hard_limits(rng, elements, dim):
+    """0.01% to 20%, exact or in 1 to 8 directions, maybe different for each element."""
+    limit = 10 ** rng.uniform(-4, np.log10(0.2))
+    size = elements if rng.random() < 0.3 else None
+    if dim == 2 and rng.random() < 0.4:
+        return StretchLimits.exact(1 + limit * rng.uniform(0.5, 2, size))
+    m = int(rng.integers(1, 9))
+    if dim == 2:
+        angles = np.pi * np.arange(m) / m
+        directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    else:
+        directions = rng.normal(size=(m, 3))
+        directions /= np.linalg.norm(directions, axis=1)[:, None]
+    shape = (m,) if size is None else (size, m)
+    spread = rng.uniform(0.5, 2, shape) if size else np.ones(shape)
+    return StretchLimits(directions, 1 + limit * spread)
+
+
+def hard_problem(rng):
+    """Masses over up to 24 decades; up to 4 pins at rest, or at the limit but for rounding."""
+    rest, elements = hard_mesh(rng)
+    n, dim = rest.shape
+    limits = hard_limits(rng, len(elements), dim)
+    frame, size = rotation(rng)[:, :dim], np.ptp(rest, axis=0).max()
+    low = limits.bounds.min()
+    target = rest * rng.uniform(0.5, 2, dim) @ frame.T
+    target += 10 ** rng.uniform(-5, -1) * size / np.sqrt(n) * rng.normal(size=(n, 3))
+    pinned = rng.permutation(n)[: int(rng.integers(0, 5))]
+    short = 1 + (low - 1) * (1 - 10 ** rng.uniform(-9, -1))
+    apart = rng.choice([1.0, low, low * (1 + 2e-16 * rng.integers(-4, 5)), short])
+    target[pinned] = apart * rest[pinned] @ frame.T
+    decades = rng.uniform(0, 24)
+    mass = 10 ** rng.uniform(-decades / 2, decades / 2, n) if rng.random() < 0.6 else None
+    return Problem(rest, elements, target + size * rng.normal(size=3), limits, pinned, mass)
 
 
 def moved(problem, Q, shift):

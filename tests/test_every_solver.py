@@ -46,6 +46,7 @@ UNSCALED = [
     "cvxpy-ecos-default",
     "cvxpy-qoco-default",
     "ipopt-default",
+    "ipopt-default-lbfgs",
     "qoco-default",
 ]
 """Out of the box: an objective known to 1e-8 of its size leaves positions uncertain by 1e-4."""

@@ -156,7 +156,10 @@ TAKEN = [
 
 
 def test_only_methods_with_a_form_for_lower_bounds_take_them():
-    assert {"ipopt", "gauss-seidel", "none"} >= set(TAKEN) - {"ipopt-default"}
+    assert {"ipopt", "gauss-seidel", "none"} >= set(TAKEN) - {
+        "ipopt-default",
+        "ipopt-default-lbfgs",
+    }
     assert "lower bounds" in str(find_solver("clarabel").supports(compressed()[0]))
 
 

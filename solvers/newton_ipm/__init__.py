@@ -25,8 +25,9 @@ products s l, a Newton step that is to change the products by c solves
    while the step grows.
 6. One step length for all, 0.99 of the way to the boundary.
 7. Where neither comes nearer, the limits may have no interior, such as those with a bound of 1 and
-   pins at rest: multipliers then have no bound. Limits wider by a part of the tolerance have one,
-   and an answer to these within the rest of it is one to the limits: Y prices what it violates.
+   pins at rest: multipliers then have no bound. Limits wider by 2e-8 to 1e-13 have one. The answer
+   to these of the least error is returned; it counts as solved where its violations are small for
+   multipliers a hundred times its own, which the referee's may be.
 8. Or there are no positions within the limits: `solvers.newton_ipm.infeasible`.
 
 A warm start carries the centred iterate of the frame before, not its last one: when the gap falls
@@ -85,12 +86,14 @@ class NewtonIPM(Solver):
 
     | status | when |
     |---|---|
-    | solved | violation and relative gap are below the tolerance |
+    | solved | violation and relative gap are below the tolerance, as the referee measures them |
     | infeasible | the dual bound exceeds the objective of any point within the limits, or the \
 pins alone are too far apart |
     | stalled | rounding: neither got better in 12 iterations (30 far from the optimum), or K has \
 no factor any more; the best iterate is returned |
-    | iteration limit, time limit | neither of these before |
+    | stalled: limits without an interior | wider limits are solved, these not to the tolerance: \
+multipliers have no bound, and the referee's may price a violation higher than the answer's own |
+| iteration limit, time limit | neither of these before |
 
     Parameters
     ----------
