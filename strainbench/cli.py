@@ -707,8 +707,8 @@ def _print_summary(summary: Summary, planned: int, results: Path) -> None:
 
 
 def _terminate(*_: object) -> None:
-    """End like Ctrl-C, once."""
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    """End like Ctrl-C; a second one ends it at once."""
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
     raise TerminatedError
 
 

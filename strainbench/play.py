@@ -341,7 +341,7 @@ class _Table:
             raise Stop(f"positions of shape {positions.shape}, type {positions.dtype}")
         if not np.all(np.isfinite(positions)):
             raise Stop(f"positions that are not finite; it says {facts['status']!r}")
-        return positions
+        return positions.copy()  # a solver may keep its own, and the problem's are read-only
 
 
 def what_it_says(solution: Solution) -> dict[str, Any]:

@@ -19,6 +19,13 @@ def pytest_addoption(parser):
         help="check certificates on N random problems with all solvers, and print what became of "
         "the answers; by default 50 problems with a third of the solvers each",
     )
+    parser.addoption(
+        "--kills",
+        type=int,
+        metavar="N",
+        default=2,
+        help="end runs at N random moments by each signal, twice as often by kill -9; by default 2",
+    )
 
 
 def pytest_configure(config):

@@ -108,21 +108,50 @@ def test_a_folder_that_cannot_be_written_to(tmp_path):
     assert "cannot be written to" in done.stderr
 
 
-def test_an_interrupt_exits_130_and_the_run_resumes(tmp_path):
-    words = [*RUN[:2], "--solver", "none,gauss-seidel", "--set", "resolution=30", "--steps", "40"]
+WAITING = """
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from strainbench import Solution, Solver
+
+@dataclass(frozen=True)
+class Waits(Solver):
+    '''Waits for a file (nobody).'''
+    name = "waits"
+
+    def solve(self, problem, state, *, tolerance, monitor, deadline):
+        while len(problem.elements) > 8 and not Path("come").exists():
+            time.sleep(0.01)
+        return Solution(problem.target.copy(), "solved", 0)
+"""
+
+
+@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupt_says_what_is_kept_and_the_run_resumes(tmp_path, sent, status):
+    (tmp_path / "waits.py").write_text(WAITING)
+    words = ["run", "stretch-square", "--set", "resolution=3", "--steps", "1"]
+    words += ["--solver", "none", "--solver", "./waits.py"]
     command = [sys.executable, "-m", "strainbench", *words]
-    process = subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
     runs = tmp_path / "results/local/run" / RUNS
-    deadline = time.monotonic() + 90
-    while not runs.exists() and time.monotonic() < deadline:
-        time.sleep(0.1)
-    process.send_signal(signal.SIGINT)
-    _, stderr = process.communicate(timeout=60)
-    assert process.returncode == 130
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            deadline = time.monotonic() + 90
+            while not runs.exists() and time.monotonic() < deadline:
+                time.sleep(0.1)
+            process.send_signal(sent)
+            _, stderr = process.communicate(timeout=60)
+        finally:
+            process.kill()
+    assert process.returncode == status
     assert "interrupted; every finished cell is kept" in stderr
-    assert "none" in runs.read_text()
+    assert [row["solver"] for row in read_rows(runs, RUN_COLUMNS)] == ["none"]
+    (tmp_path / "come").touch()
+    done = strainbench(*words, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "1 cells finished before" in done.stdout
+    assert [row["solver"] for row in read_rows(runs, RUN_COLUMNS)] == ["none", "waits"]
 
 
 def test_list_names_solvers_and_scenarios(tmp_path):

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
-from strainbench.judge import _cut_off, _outcome
+import pytest
+
+from strainbench.judge import _cut_off, _outcome, judge_limit, unjudged
+from strainbench.plan import plan
+from strainbench.play import read_journal
 from strainbench.referee import Certificate
 
 
@@ -59,3 +64,74 @@ def test_a_projection_cut_off_at_the_limit_counts_as_far_as_it_went():
     events = [{"event": "started", "at": 100.0}, {"event": "projection", "at": 103.0}]
     assert _cut_off(cell, events, "time limit of 10 s") == [7.0]
     assert _cut_off(cell, events, "") == []
+
+
+LINES = [
+    {"event": "warming", "at": 1.0},
+    {"event": "ready", "at": 2.0},
+    {"event": "started", "at": 3.0},
+    {"event": "setup", "at": 3.5, "seconds": 0.5},
+]
+
+
+@pytest.mark.parametrize(
+    "junk",
+    [
+        "{}",
+        "nonsense",
+        "[1]",
+        "1e999",
+        "[" * 100_000,
+        '{"event": "ready", "at": "noon"}',
+        '{"event": "ready", "at": NaN}',
+        '{"event": "party", "at": 1.0}',
+        '{"event": "setup", "at": 1.0}',
+        '{"event": "setup", "at": 1.0, "seconds": "long"}',
+        '{"event": "projection", "at": 1.0, "step": 1, "begin": 0, "end": 0, "seconds": 0, '
+        '"iterations": 1, "status": "", "details": {"x": "text"}}',
+        "\udcff",
+    ],
+)
+def test_a_damaged_journal_is_read_up_to_there(tmp_path, junk):
+    lines = [*map(json.dumps, LINES), junk, json.dumps(LINES[0])]
+    text = "".join(line + "\n" for line in lines)
+    (tmp_path / "events.jsonl").write_bytes(text.encode(errors="surrogateescape"))
+    events, damage = read_journal(tmp_path)
+    assert events == LINES
+    assert damage == "the journal is damaged at line 5"
+
+
+def test_a_torn_last_line_is_no_damage(tmp_path):
+    (tmp_path / "events.jsonl").write_text("".join(json.dumps(e) + "\n" for e in LINES) + '{"ev')
+    assert read_journal(tmp_path) == (LINES, "")
+
+
+def test_what_was_measured_is_kept_where_the_referee_fails(tmp_path):
+    (cell,) = plan(["swing"], ["none"], [], "simulate", 3, [1e-6], None)
+    said = {"iterations": 4, "status": "solved", "details": {"x": 1.0}}
+    projection = {"event": "projection", "at": 5.0, "step": 1, "begin": 4.0, "end": 5.0}
+    events = [*LINES, projection | {"seconds": 1.0} | said]
+    (tmp_path / "events.jsonl").write_text("".join(json.dumps(e) + "\n" for e in events))
+    row, steps = unjudged(cell, tmp_path, "time limit of 2 s", "OSError: no")
+    words = "the referee failed: OSError: no (0 of 3 steps); before that, time limit of 2 s"
+    assert (row["outcome"], row["reason"]) == ("no answer", words)
+    assert (row["solve_seconds_mean"], row["setup_seconds"]) == (1.0, 0.5)
+    assert (row["iterations_mean"], row["details_mean"]) == (4.0, '{"x": 1.0}')
+    assert [(s["seconds"], s["iterations"], s["outcome"]) for s in steps] == [(1.0, 4, "no answer")]
+
+
+def test_solves_that_take_longer_than_they_say_are_no_answer():
+    events = [
+        {"event": "projection", "status": "solved", "begin": 0.0, "end": 2.0, "seconds": s}
+        for s in (2.0, 1.9)
+    ]
+    assert judged([certificate("optimal")], done=3, events=events)[0] == "optimal"
+    events[0]["seconds"] = 0.0
+    outcome, reason = judged([certificate("optimal")], done=3, events=events)
+    assert outcome == "no answer"
+    assert "the clock was tampered with: solves of 1.90 s by its account took 4.00 s" in reason
+
+
+def test_the_referee_has_time_in_proportion_to_the_problem():
+    assert judge_limit([]) == judge_limit([{"event": "loaded", "variables": 300}])
+    assert judge_limit([{"event": "loaded", "variables": 300_000}]) == 10 * judge_limit([])
