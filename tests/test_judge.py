@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from strainbench.judge import _cut_off, _outcome
+from strainbench.judge import _cut_off, _in_time, _outcome
 from strainbench.referee import Certificate
 
 
@@ -59,3 +59,10 @@ def test_a_projection_cut_off_at_the_limit_counts_as_far_as_it_went():
     events = [{"event": "started", "at": 100.0}, {"event": "projection", "at": 103.0}]
     assert _cut_off(cell, events, "time limit of 10 s") == [7.0]
     assert _cut_off(cell, events, "") == []
+
+
+def test_a_projection_that_came_back_late_is_not_in_time():
+    projections = [{"event": "projection", "at": at} for at in (103.0, 109.9, 110.5)]
+    events = [{"event": "started", "at": 100.0}, *projections]
+    assert _in_time(SimpleNamespace(time_limit=10.0), events, projections) == 2
+    assert _in_time(SimpleNamespace(time_limit=None), events, projections) == 3
