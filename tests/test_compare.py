@@ -115,3 +115,22 @@ def test_the_command_line(found, tmp_path):
     for text in ("5 cells in both", "worse", "only in B", "wrote c.csv"):
         assert text in done.stdout
     assert (tmp_path / "c.csv").read_text() == found.csv()
+
+
+@pytest.mark.parametrize(
+    "change", [{"machine": "another"}, {"blas_threads": 4}, {"outcome": "no answer"}]
+)
+def test_what_does_not_compare_is_in_no_mean(tmp_path, change):
+    a = folder(tmp_path / "a", row("one", blas_threads=1))
+    b = folder(tmp_path / "b", row("one", **{"blas_threads": 1} | change))
+    found = compare(a, b)
+    assert "geometric mean" not in "\n".join(found.head())
+    assert not found.matched[0].ratio > 0
+
+
+def test_cells_of_other_step_sizes_are_in_other_tables(tmp_path):
+    rows = [row("one", scenario_parameters=f'{{"step": {h}}}') for h in (0.01666, 0.016664)]
+    a = folder(tmp_path / "a", *rows)
+    titles = [title for title, _ in compare(a, a).groups()]
+    assert ["step 0.01666," in t for t in titles] == [True, False]
+    assert ["step 0.016664," in t for t in titles] == [False, True]

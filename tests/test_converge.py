@@ -18,6 +18,7 @@ from strainbench.report.convergence import (
     load_convergence,
     methods,
     reached,
+    unreached,
     write_convergence,
 )
 from strainbench.solver import Clock
@@ -232,3 +233,41 @@ def test_the_command_line(tmp_path):
 def test_a_folder_without_samples(tmp_path):
     with pytest.raises(RecordsError, match=r"holds no convergence\.csv"):
         load_convergence(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("ending", "words"),
+    [("time limit of 20 s", "not within 20 s"), ("it says 'x'", "never"), ("crashed: ...", "-")],
+)
+def test_an_unreached_level_says_why(ending, words):
+    assert unreached(pd.DataFrame([{"ending": ending, "time_limit": 20.0}])) == words
+
+
+LATE = """
+import time
+from strainbench import Solution, Solver
+
+class Late(Solver):
+    "Two tenths of a second a run, what it has at the deadline (nobody)"
+    name = "late"
+    def solve(self, problem, state, *, tolerance, monitor, deadline):
+        if len(problem.target) < 10:  # the warm-up
+            return Solution(problem.target.copy(), "solved", 1)
+        while tolerance < 1 and not deadline.passed:
+            time.sleep(0.01)
+        time.sleep(0.05)
+        x = problem.target.copy()
+        x[problem.free] *= 3.0 if deadline.passed else 1.0
+        return Solution(x, "cut off" if deadline.passed else "solved", 1)
+"""
+
+
+def test_what_a_budget_cut_off_is_no_sample(tmp_path):
+    path = tmp_path / "late.py"
+    path.write_text(LATE)
+    cells = plan_scene("swing", [str(path)], ["resolution=3"], 1, 1e-4, time_limit=2.0)
+    list(converge(cells, record(recorder(cells[0]), 1), 1, tmp_path / "results", 4096))
+    rows = samples_of(load_convergence(tmp_path / "results"), "late")
+    assert rows["status"].unique() == ["solved"]
+    assert rows["tolerance"].tolist() == [100.0, 10.0, 1.0]
+    assert rows["ending"].unique() == ["time limit of 2 s"]

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from strainbench.judge import _cut_off, _outcome, judge_limit, unjudged
+from strainbench.judge import _cut_off, _in_time, _outcome, judge_limit, unjudged
 from strainbench.plan import plan
 from strainbench.play import read_journal
 from strainbench.referee import Certificate
@@ -135,3 +135,10 @@ def test_solves_that_take_longer_than_they_say_are_no_answer():
 def test_the_referee_has_time_in_proportion_to_the_problem():
     assert judge_limit([]) == judge_limit([{"event": "loaded", "variables": 300}])
     assert judge_limit([{"event": "loaded", "variables": 300_000}]) == 10 * judge_limit([])
+
+
+def test_a_projection_that_came_back_late_is_not_in_time():
+    projections = [{"event": "projection", "at": at} for at in (103.0, 109.9, 110.5)]
+    events = [{"event": "started", "at": 100.0}, *projections]
+    assert _in_time(SimpleNamespace(time_limit=10.0), events) == projections[:2]
+    assert _in_time(SimpleNamespace(time_limit=None), events) == projections

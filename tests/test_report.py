@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 from xml.etree import ElementTree
 
+import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.figure import Figure
 
 from strainbench.records import (
     MACHINES,
@@ -20,7 +22,8 @@ from strainbench.records import (
 from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
 from strainbench.report.energy import energies
-from strainbench.report.sweep import beyond, sweeps
+from strainbench.report.names import digits_of
+from strainbench.report.sweep import _draw_line, beyond, sweeps
 from strainbench.report.table import (
     accuracy_text,
     as_markdown,
@@ -255,3 +258,125 @@ def test_cold_and_warm_starts_stand_side_by_side(tmp_path):
     markdown = as_markdown(runs, {})
     assert f"| {' | '.join(expected)} |" in markdown
     assert "Cold and warm" not in as_markdown(runs[runs["solver"] == "other"], {})
+
+
+# --- what would mislead
+
+
+def table_of(tmp_path, *rows):
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
+    return as_markdown(load_runs(tmp_path), {})
+
+
+def test_every_table_has_its_chart_and_the_page_has_all(tmp_path):
+    rows = [row("good"), row("good", mode="replay"), row("other", scenario="twist")]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
+    paths = write_report(tmp_path)
+    charts = [p.name for p in paths if p.name.startswith("speed") and p.suffix == ".svg"]
+    assert charts == ["speed-accuracy.svg", "speed-accuracy-2.svg", "speed-accuracy-3.svg"]
+    titles = ["".join(ElementTree.parse(tmp_path / c).getroot().itertext()) for c in charts]
+    assert ["replay" in title for title in titles] == [True, False, False]
+    assert (tmp_path / "index.html").read_text().count("<svg") == 3
+
+
+def test_steps_that_differ_in_the_fifth_digit_are_told_apart(tmp_path):
+    steps = [row("good", scenario_parameters=json.dumps({"step": h})) for h in (0.01666, 0.016664)]
+    text = table_of(tmp_path, *steps)
+    assert "step 0.01666," in text
+    assert "step 0.016664," in text
+    assert digits_of([1 / 60]) == 4
+
+
+@pytest.mark.parametrize("seconds", ["", 0.0])
+def test_there_is_no_row_of_implicit_euler_where_it_did_not_run(tmp_path, seconds):
+    rows = [row("none", ie_seconds_mean=seconds), row("good", ie_seconds_mean=seconds)]
+    text = table_of(tmp_path, *rows)
+    assert "implicit Euler" not in text
+    assert "0.0000" not in text
+
+
+def test_a_mesh_from_a_file_is_called_by_it(tmp_path):
+    about = {"scenario": "garment", "resolution": 20, "directions": 4, "constraints": 2048}
+    text = table_of(
+        tmp_path,
+        row("good", scenario_parameters=json.dumps({"path": "of/shirt.obj"}), **about),
+        row("skirt", scenario_parameters=json.dumps({"path": "", "resolution": 20}), **about),
+    )
+    assert "| shirt.obj, 512 elements [s] |" in text
+    assert "| resolution 20, 512 elements [s] |" in text
+    assert "20×20" not in text
+
+
+def test_a_scene_without_limit_or_resolution_stays_in_table_and_ledger(tmp_path):
+    bare = {"limit": "", "resolution": "", "variables": 9, "constraints": 8, "nonzeros": 7}
+    text = table_of(tmp_path, row("good", **bare), row("better", **bare))
+    assert "|  | good |" in text
+    assert "|  | better |" in text
+    assert "| swing |  | 2 elements | 4 | 9 | 8 |  | 7 |" in text
+
+
+def test_the_ledger_keeps_meshes_of_other_sizes_apart(tmp_path):
+    sizes = {"nonzeros": 7, "constraints": 800}
+    rows = [
+        row("good", scenario_parameters=json.dumps({"seed": k}), variables=v, **sizes)
+        for k, v in ((1, 300), (2, 294))
+    ]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
+    assert ledger(load_runs(tmp_path))["variables"].tolist() == [300, 294]
+
+
+def test_a_distance_that_the_reference_does_not_resolve_is_a_bound(tmp_path):
+    rows = [row("near", distance_max=2e-6, reference_error_max=3e-6)]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
+    (near,) = (r for _, r in load_runs(tmp_path).iterrows())
+    assert accuracy_text(near) == "3e-9 · 2e-6 · <0.005"
+
+
+def test_a_line_is_broken_where_a_cell_has_no_answer(tmp_path):
+    outcomes = {0.01: "optimal", 0.02: "no answer", 0.03: "violated", 0.05: "optimal"}
+    swept = [
+        row("good", outcome=o, scenario_parameters=json.dumps({"step": h}))
+        for h, o in outcomes.items()
+    ]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, swept)
+    cells = sweeps(load_runs(tmp_path))["step"]
+    figure = Figure()
+    axes = figure.subplots(1, 3)
+    _draw_line(axes, cells, {"color": "red", "marker": "o"}, 0.9)
+    line, full, hollow, failed = axes[0].lines
+    assert list(np.isnan(line.get_ydata())) == [False, True, False, False]
+    assert list(np.isfinite(full.get_ydata())) == [True, False, False, True]
+    assert list(np.isfinite(hollow.get_ydata())) == [False, False, True, False]
+    assert (hollow.get_fillstyle(), full.get_fillstyle()) == ("none", "full")
+    assert list(failed.get_xdata()) == [0.02]
+
+
+def test_other_ways_to_run_are_other_lines_of_a_sweep(tmp_path):
+    swept = [
+        row("good", mode=mode, scenario_parameters=json.dumps({"step": h}))
+        for h in (0.01, 0.02, 0.03)
+        for mode in ("simulate", "replay")
+    ]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, swept)
+    assert sweeps(load_runs(tmp_path))["step"]["line"].nunique() == 2
+
+
+def test_steps_of_an_earlier_longer_run_have_no_part_in_its_energies(tmp_path):
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, [row("good", cell="c", projections=2, steps_done=2)])
+    steps = [
+        {"cell": "c", "step": k, "projection": k, "time": 0.1 * k, "kinetic_energy": energy}
+        for energy, count in ((5e-3, 4), (1e-3, 2))
+        for k in range(1, count + 1)
+    ]
+    append_rows(tmp_path / STEPS, STEP_COLUMNS, steps)
+    table = energies(tmp_path, load_runs(tmp_path))
+    assert table["energy"].tolist() == pytest.approx([1e-3, 1e-3])
+    assert table["curve"].unique()[0].endswith("ended after 2 of 10 steps")
+
+
+def test_no_ratio_of_a_start_that_failed(tmp_path):
+    warm = {"solver_parameters": '{"warm": true}', "solve_seconds_median": 0.1}
+    failed = row("good", outcome="no answer", steps_done=3, solve_seconds_median=0.2)
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, [failed, row("good-warm", **warm)])
+    (pair,) = pairs(load_runs(tmp_path))
+    assert pair.line()[3] == "no answer → optimal"

@@ -16,6 +16,9 @@ from scenarios.stretch_square import StretchSquare
 from scenarios.twist import Twist
 from strainbench import certify, solve
 from strainbench.discovery import find_scenario, list_scenarios
+from strainbench.judge import _missed
+from strainbench.plan import plan
+from strainbench.play import FRAMES
 from strainbench.reference import reference_of
 from strainbench.scenario import ClothScenario, SheetScenario
 
@@ -269,3 +272,47 @@ def test_a_curve_or_pattern_that_is_not_there_is_named(tmp_path):
     (tmp_path / "bad.csv").write_text("angle,bound\n0,1.1\n")
     with pytest.raises(ValueError, match="columns"):
         Chainmail(curve_file=str(tmp_path / "bad.csv"))
+
+
+# --- what a scene is about
+
+
+def test_a_run_that_is_not_told_takes_enough_steps():
+    assert Collision().usual_steps == 60
+    assert SphereDrop().usual_steps == 80
+    assert Flag().usual_steps == 10
+    assert Collision(step=0.001).usual_steps == 300
+    assert Twist(resolution=4).usual_steps == 12
+    assert Twist(resolution=4, limit=0.5).usual_steps == 10
+    assert [c.steps for c in plan_all("collision")] == [60]
+
+
+def plan_all(scene):
+    return plan([scene], ["none"], [], "simulate", None, [1e-6], None)
+
+
+def test_contact_has_begun_in_the_margin_and_not_above():
+    scene = SphereDrop(resolution=4)
+    x = scene.sheet()[2]
+    assert not scene.has_begun(x)
+    assert scene.has_begun(x - [0.0, 0.011, 0.0])
+    assert Flag(resolution=4).has_begun(Flag(resolution=4).sheet()[2])
+
+
+def test_a_twist_has_begun_where_no_positions_meet_the_limits():
+    scene = Twist(resolution=4)
+    first = int(scene.first_step)
+    degrees = scene.turn_rate * scene.step
+    turns = [turned(scene, np.deg2rad(degrees * k)).target for k in (first - 1, first)]
+    assert [scene.has_begun(x) for x in turns] == [False, True]
+
+
+def test_a_row_says_what_never_happened(tmp_path):
+    scene, folder = Collision(resolution=4), tmp_path / "cell"
+    folder.mkdir()
+    with (folder / FRAMES).open("wb") as file:
+        for _ in range(2 * 5):  # candidates and answers
+            np.save(file, scene.sheet()[2])
+    nothing, contact = _missed(scene, folder, 5, 5)
+    assert nothing == "no candidate was beyond the limits: nothing had to be projected"
+    assert contact == "contact never happened in these 5 steps; it begins at about step 19"
