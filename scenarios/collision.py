@@ -27,12 +27,15 @@ class Collision(ClothScenario):
 
     Parameters
     ----------
-    stiffness, margin : of the penalty, see `Contact` [N/m], [m].
+    stiffness : of the penalty, see `Contact` [N/m].
+    margin : the distance at which the penalty begins [m].
     floor : height of a floor [m], or None.
     """
 
     name = "collision"
     needs = frozenset({"inertia", "gravity", "membrane", "bending", "contact"})
+    begins = 0.095  # measured at 6, 10 and 20 cells
+    lasts = 0.3
 
     limit: float = 0.001
     norm: str = "mass"

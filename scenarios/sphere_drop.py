@@ -28,11 +28,14 @@ class SphereDrop(ClothScenario):
 
     Parameters
     ----------
-    stiffness, margin : of the penalty, see `Contact` [N/m], [m].
+    stiffness : of the penalty, see `Contact` [N/m].
+    margin : the distance at which the penalty begins [m].
     """
 
     name = "sphere-drop"
     needs = frozenset({"inertia", "gravity", "membrane", "bending", "contact"})
+    begins = float(np.sqrt(2 * GAP / 9.81))
+    lasts = 0.4  # the corners meet the floor at 0.25 s
 
     norm: str = "mass"
     step: float = 1 / 200

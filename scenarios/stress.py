@@ -37,6 +37,7 @@ class Stress(SheetScenario):
         fast-pins: the sheet is flat at first; in each step the pins move 2 severity edges along
         its normal, and the rest of the candidate stays where the last projection left it.
     severity : 1, or 0.1 for the easier neighbour.
+    seed : of the directions of `displaced`.
     """
 
     name = "stress"

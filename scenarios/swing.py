@@ -19,6 +19,10 @@ class Swing(ClothScenario):
     """A square sheet that swings from two corners (Tang et al. 2022, section 5, Table 1).
 
     It starts at rest in the horizontal xz-plane, with two adjacent corners pinned.
+
+    Parameters
+    ----------
+    diagonals : "alternating" or "uniform".
     """
 
     name = "swing"

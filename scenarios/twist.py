@@ -10,7 +10,7 @@ import numpy as np
 from strainbench.limits import FloatArray
 from strainbench.mesh import square_grid
 from strainbench.problem import IntArray, longest_edges
-from strainbench.scenario import Scenario, SheetScenario, StepReport
+from strainbench.scenario import FEWEST_STEPS, Scenario, SheetScenario, StepReport
 
 SIDE = 0.5  # [m]
 
@@ -43,6 +43,7 @@ class Twist(SheetScenario):
 
     name = "twist"
     needs = frozenset()
+    about = "an infeasible step"
 
     turn_rate: float = 90.0
     step: float = 1 / 60
@@ -58,6 +59,22 @@ class Twist(SheetScenario):
         """See the base class: a quarter of the angle, where the first step is past the limit."""
         past = np.deg2rad(abs(self.turn_rate)) * self.step >= self.infeasible_angle
         return replace(self, turn_rate=self.turn_rate / 4) if past else super().easier()
+
+    @property
+    def first_step(self) -> float:
+        """See the base class; infinite where the ends never turn too far."""
+        turn = abs(self.turn_rate) * self.step
+        return max(1.0, np.ceil(np.rad2deg(self.infeasible_angle) / turn)) if turn else np.inf
+
+    @property
+    def usual_steps(self) -> int:
+        """See the base class: one step past the limit, beyond which many methods do not go."""
+        first = self.first_step
+        return max(FEWEST_STEPS, int(first) + 1) if np.isfinite(first) else FEWEST_STEPS
+
+    def has_begun(self, candidate: FloatArray) -> bool:
+        """See the base class."""
+        return self.problem().with_target(candidate).infeasible_pins() is not None
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class; the axis is x."""

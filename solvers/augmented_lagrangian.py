@@ -252,7 +252,7 @@ def blocks(problem: Problem) -> Blocks:
     M[problem.free] = problem.weights[problem.free]
     W[problem.free] = 1 / problem.weights[problem.free]
     area = problem.measures ** (2 / problem.rest.shape[-1])
-    scale = np.repeat(area / np.mean(1 / problem.weights), c // len(area))
+    scale = np.repeat(area / np.mean(1 / problem.weights[problem.used]), c // len(area))
     vertices = problem.row_vertices.reshape(c, m, k)[:, 0].astype(np.int32)
     g = problem.row_coefficients.reshape(c, m, k).copy()
     return Blocks(vertices, g, scale, M, W, (0,) * k, (0,) * m)

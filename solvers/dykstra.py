@@ -196,7 +196,7 @@ def start(problem: Problem, G: Blocks, multipliers: FloatArray) -> tuple[Frame, 
     """The frame, and an iterate at any multipliers (rows, 3)."""
     Gt = (problem.G @ problem.target).reshape(problem.constraints, -1, 3)
     M = problem.weights[:, None].copy()
-    M[problem.pinned] = 0.0
+    M[problem.held] = 0.0
     frame = Frame(problem.bounds, problem.target, Gt, M)
     x, Y = problem.target.copy(), multipliers.reshape(Gt.shape).copy()
     place(G, frame, x, Y)

@@ -21,6 +21,7 @@ import scipy.sparse as sp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.limits import FloatArray
 from strainbench.problem import IntArray
+from strainbench.solver import held_still
 from strainbench.warm import Memory
 
 STATUS = {
@@ -72,7 +73,10 @@ class Ipopt(Solver):
 
     name = "ipopt"
     takes_lower = True
-    variants = {"default": {"scaling": "default"}}
+    variants = {
+        "default": {"scaling": "default"},
+        "default-lbfgs": {"scaling": "default", "hessian": "limited-memory"},
+    }
 
     scaling: str = "scaled"
     hessian: str = "exact"
@@ -108,7 +112,7 @@ class Ipopt(Solver):
         positions, Y = state.start(problem)
         start = positions[problem.free].ravel() / unit
         if start.size == 0:
-            return Solution(problem.target.copy(), "solved", 0)
+            return held_still(problem, tolerance)
         rows, options, given = state.mesh.rows, self._options(tolerance, deadline), {}
         if np.any(Y):
             options["warm_start_init_point"] = "yes"

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.conic import ConicForm
+from strainbench.solver import held_still
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class Qoco(Solver):
     ) -> Solution:
         """One interior-point run, aiming at a hundredth of `tolerance`; unscaled, at QOCO's own."""
         if state is None:
-            return Solution(problem.target.copy(), "solved", 0)
+            return held_still(problem, tolerance)
         solver = set_up(state, problem)
         if self.scaling is not None:
             solver.update_settings(abstol=1e-2 * tolerance, reltol=1e-2 * tolerance)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from strainbench.discovery import find_scenario, find_solver, load_file
+from strainbench.fields import plain, restored
 from strainbench.reference import REFERENCE_SOLVER
 from strainbench.scenario import Scenario
 from strainbench.solver import Solver
@@ -24,7 +25,7 @@ class PluginRef:
     ----------
     name : its class's name in the suite
     label : with what sets it apart from the defaults
-    parameters : all its fields
+    parameters : all its fields, as JSON has them
     path : of the file that it came from, or None for one of ours
     source : that file or folder in words: from the project's top for one of ours
     content : digest of its source and of the files that its parameters name, when the run was
@@ -41,35 +42,40 @@ class PluginRef:
     unavailable: str | None = None
 
     @classmethod
-    def of(cls, plugin: Solver | Scenario, path: str | None = None) -> PluginRef:
+    def of(
+        cls, plugin: Solver | Scenario, path: str | None = None, label: str | None = None
+    ) -> PluginRef:
         """A reference to `plugin`, from the file at `path` unless it is ours."""
         source = path or plugin_source(type(plugin))
-        parameters = plugin.parameters
+        parameters = {name: plain(value) for name, value in plugin.parameters.items()}
         content = content_of(source, parameters.values())
-        return cls(plugin.name, plugin.label, tuple(parameters.items()), path, source, content)
+        label = str(plugin.label) if label is None else label
+        return cls(plugin.name, label, tuple(parameters.items()), path, source, content)
 
     def solver(self) -> Solver:
         """Load it as a solver; ValueError if its source was edited since."""
         self._check()
         if self.path is None:
-            return replace(find_solver(self.name), **self._settings)
-        return next(c for c in load_file(self.path, Solver) if c.name == self.name)(
-            **self._settings
-        )
+            solver = find_solver(self.name)
+        else:
+            solver = next(c for c in load_file(self.path, Solver) if c.name == self.name)()
+        known = [solver.parameters, *solver.variants.values()]
+        return replace(solver, **self._settings(type(solver), known))
 
     def scenario(self) -> Scenario:
         """Load it as a scenario; ValueError if its source was edited since."""
         self._check()
         classes = load_file(self.path, Scenario) if self.path else [find_scenario(self.name)]
-        return next(c for c in classes if c.name == self.name)(**self._settings)
+        scenario = next(c for c in classes if c.name == self.name)()
+        return replace(scenario, **self._settings(type(scenario), [scenario.parameters]))
 
     def _check(self) -> None:
-        if self.content != content_of(self.source, self._settings.values()):
+        if self.content != content_of(self.source, dict(self.parameters).values()):
             raise ValueError(f"{self.source}, or a file that it reads, was edited during the run")
 
-    @property
-    def _settings(self) -> dict[str, Any]:
-        return dict(self.parameters)
+    def _settings(self, kind: type, known: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+        values = {name: [k[name] for k in known if name in k] for name, _ in self.parameters}
+        return restored(kind, dict(self.parameters), values)
 
     @property
     def identity(self) -> list[object]:
@@ -92,7 +98,7 @@ def _named_files(source: str, settings: Iterable[object]) -> list[Path]:
     """The files that settings name, as they stand or in the data folder beside a plug-in."""
     words = [Path(v) for v in settings if isinstance(v, str | Path) and str(v)]
     places = [(word, plugin_files(source)[0].parent / "data" / word) for word in words]
-    found = [next((file for file in place if file.is_file()), None) for place in places]
+    found = [next((file for file in place if _is_file(file)), None) for place in places]
     return [file for file in found if file]
 
 
@@ -140,6 +146,13 @@ class Cell:
     def title(self) -> str:
         """For the progress bar."""
         return f"{self.scenario.label}, {self.solver.label}"
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # too long for a name, or with a null character
+        return False
 
 
 def _digest(content: object) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shlex
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -21,22 +23,23 @@ from rich.progress import (
     TimeElapsedColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
 
 from strainbench import __version__
 from strainbench.cell import Cell
-from strainbench.discovery import Entry, list_scenarios, list_solvers
+from strainbench.discovery import list_scenarios, told
+from strainbench.escape import plain, terminal
 from strainbench.export import check_format, write_problem
 from strainbench.frame import record, record_all, recorded, recorder
+from strainbench.listing import tables
 from strainbench.machine import describe_machine, fixed_threads
+from strainbench.options import WrongWordError, number, path, shown, whole
 from strainbench.plan import never_warm, plan, plan_one, plan_scene
 from strainbench.problem import Problem
-from strainbench.records import RecordsError
+from strainbench.records import DiskError, open_folder
 from strainbench.reference import REFERENCE_SOLVER
 from strainbench.runner import Observer, Runner, Settings, Summary
 
 app = typer.Typer(
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Benchmark strain-limiting solvers for cloth: same scenes, one referee.",
@@ -47,31 +50,84 @@ DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
 DEFAULT_CONVERGENCE = Path("results/local/convergence")
 DEFAULT_DUEL = Path("results/local/duel")
-DEFAULT_STEPS = 10
 INTERRUPTED = 130  # exit status after Ctrl-C
+TERMINATED = 128 + signal.SIGTERM  # and after a polite kill
+DEBUG = "STRAINBENCH_DEBUG"
+MOST_THREADS = 1024
+VERBS = (
+    *("list", "run", "report", "compare", "converge"),
+    *("duel", "export", "ledger", "render", "polar"),
+)
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
+
+
+Folder = Annotated[
+    Path,
+    typer.Option(
+        "--results", parser=path("--results"), metavar="DIR", help="folder of the results"
+    ),
+]
+Tolerance = Annotated[
+    float,
+    typer.Option(
+        "--tolerance", parser=number("--tolerance"), metavar="X", help="aimed at by every solver"
+    ),
+]
+Steps = Annotated[
+    int, typer.Option("--steps", parser=whole("--steps"), metavar="N", help="time steps")
+]
+FrameNumber = Annotated[
+    int,
+    typer.Option(
+        "--frame",
+        parser=whole("--frame"),
+        metavar="K",
+        help="which projection, the first being 1",
+    ),
+]
+
+
+class TerminatedError(BaseException):
+    """SIGTERM: the end of everything, as Ctrl-C is."""
+
+
+class InterruptedRunError(Exception):
+    """Ctrl-C or SIGTERM, and what is kept."""
+
+    def __init__(self, cause: BaseException, kept: str) -> None:
+        super().__init__(kept)
+        self.status = TERMINATED if isinstance(cause, TerminatedError) else INTERRUPTED
+
+
+def say(line: object, on: Console = console) -> None:
+    """Print a line as it is: what looks like markup in it is text."""
+    on.print(terminal(line), soft_wrap=True)
+
+
+@app.callback(invoke_without_command=True)
+def strainbench(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="show the version and exit")] = False,
+) -> None:
+    """Benchmark strain-limiting solvers for cloth: same scenes, one referee."""
+    if version:
+        say(f"strainbench {__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        console.print(terminal(context.get_help()))
+        raise WrongWordError(f"a command is missing; valid are {', '.join(VERBS)}")
 
 
 @app.command("list")
 def list_(
-    what: Annotated[str, typer.Argument(help="solvers, scenarios, or nothing for both")] = "",
+    what: Annotated[
+        str | None,
+        typer.Argument(help="solvers, scenarios, nothing for both; or one of them, for its fields"),
+    ] = None,
 ) -> None:
-    """List solvers and scenarios: method, paper, availability."""
-    tables = {"solvers": list_solvers, "scenarios": list_scenarios}
-    if what and what not in tables:
-        raise ValueError(f"list {what}: valid are solvers, scenarios")
-    for name, entries in tables.items():
-        if what in ("", name):
-            console.print(_entries(name, entries()))
-
-
-def _entries(title: str, entries: Sequence[Entry]) -> Table:
-    table = Table(title=title, title_justify="left", title_style="bold")
-    for column in ("name", "method" if title == "solvers" else "scene", "paper", "available"):
-        table.add_column(column, overflow="fold", no_wrap=column == "name")
-    for e in entries:
-        table.add_row(e.name, e.method, e.paper, e.unavailable or "yes")
-    return table
+    """List solvers and scenarios: method, paper, availability; or the fields of one."""
+    for table in tables(what):
+        console.print(table)
 
 
 @app.command()
@@ -86,10 +142,20 @@ def run(
         typer.Option("--set", help="KEY=V1,V2 of the scenario, or SOLVER.KEY=V1,V2"),
     ] = None,
     steps: Annotated[
-        int | None, typer.Option(help=f"time steps a cell; {DEFAULT_STEPS} if not given")
+        int | None,
+        typer.Option(
+            parser=whole("--steps"),
+            metavar="N",
+            help="time steps a cell; if not given, what the scene takes",
+        ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(help="seconds of the scene's time a cell, instead of --steps")
+        float | None,
+        typer.Option(
+            parser=number("--duration", " of seconds"),
+            metavar="SECONDS",
+            help="of the scene's time a cell, instead of --steps",
+        ),
     ] = None,
     mode: Annotated[str, typer.Option(help="simulate (closed loop) or replay (same frames)")] = (
         "simulate"
@@ -102,26 +168,42 @@ def run(
         "1e-6"
     ),
     time_limit: Annotated[
-        float | None, typer.Option(help="seconds a cell, physics and solver; none by default")
+        float | None,
+        typer.Option(
+            parser=number("--time-limit", " of seconds"),
+            metavar="SECONDS",
+            help="a cell, physics and solver; none by default",
+        ),
     ] = None,
     memory_limit: Annotated[
-        float | None, typer.Option(help="MB a cell; by default 3/4 of the machine's, shared")
+        float | None,
+        typer.Option(
+            parser=number("--memory-limit", " of MB"),
+            metavar="MB",
+            help="a cell; by default 3/4 of the machine's, shared",
+        ),
     ] = None,
     jobs: Annotated[
-        int, typer.Option(help="cells at a time; with more than one, times are disturbed")
+        int,
+        typer.Option(
+            parser=whole("--jobs"),
+            metavar="N",
+            help="cells at a time; with more than one, times are disturbed",
+        ),
     ] = 1,
-    threads: Annotated[int, typer.Option(help="threads a solver")] = 1,
+    threads: Annotated[
+        int,
+        typer.Option(parser=whole("--threads", MOST_THREADS), metavar="N", help="threads a solver"),
+    ] = 1,
     scheduler: Annotated[
         str | None, typer.Option(help="address of a dask scheduler whose workers run the cells")
     ] = None,
-    results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_RESULTS,
+    results: Folder = DEFAULT_RESULTS,
     rerun: Annotated[bool, typer.Option("--rerun", help="run finished cells again")] = False,
 ) -> None:
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
-    if jobs < 1:
-        raise ValueError(f"--jobs {jobs}: a whole number above 0 is valid")
-    if memory_limit is not None and not memory_limit > 0:
-        raise ValueError(f"--memory-limit {memory_limit}: a number of MB above 0 is valid")
+    if scheduler is not None and not scheduler.strip():
+        raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
     if steps is not None and duration is not None:
         raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
     cells = plan(
@@ -129,7 +211,7 @@ def run(
         solver or ["all"],
         set_ or [],
         mode,
-        DEFAULT_STEPS if steps is None else steps,
+        steps,
         _numbers(tolerance),
         time_limit,
         duration,
@@ -137,17 +219,21 @@ def run(
         threads,
     )
     if "cold" not in start and (cold := never_warm(solver or ["all"])):
-        left_out = f"left out, as they cannot start warm: {', '.join(cold)}"
-        console.print(left_out, highlight=False, markup=False, soft_wrap=True)
+        say(f"left out, as they cannot start warm: {', '.join(cold)}")
+    jobs = min(jobs, len(cells))
     memory = memory_limit or 0.75 * psutil.virtual_memory().total / 1024**2 / jobs
-    settings = Settings(results, jobs, threads, memory, rerun)
-    with Display() as display:
-        if scheduler:
-            from strainbench.cluster import run_on_cluster  # dask only where it is asked for
+    settings = Settings(results, jobs, memory, rerun)
+    display = Display()
+    try:
+        with display:
+            if scheduler is not None:
+                from strainbench.cluster import run_on_cluster  # dask only where it is asked for
 
-            run_on_cluster(scheduler, cells, settings, display)
-            return
-        summary = Runner(settings, display).run(cells)
+                run_on_cluster(scheduler, cells, settings, display)
+                return
+            summary = Runner(settings, display).run(cells)
+    except (KeyboardInterrupt, TerminatedError) as end:
+        raise InterruptedRunError(end, display.kept(len(cells))) from None
     _print_summary(summary, len(cells), results)
 
 
@@ -156,27 +242,34 @@ def _numbers(text: str) -> list[float]:
         return [float(word) for word in text.split(",")]
     except ValueError:
         raise ValueError(
-            f"--tolerance {text}: a number, or several with commas, is valid"
+            f"--tolerance {shown(text)}: a number, or several with commas, is valid"
         ) from None
 
 
 @app.command()
 def report(
-    results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_RESULTS,
+    results: Folder = DEFAULT_RESULTS,
 ) -> None:
     """Write tables (CSV, Markdown, LaTeX), charts and an HTML page from results."""
     from strainbench.report import write_report  # pandas and matplotlib only where needed
 
-    for path in write_report(results):
-        console.print(f"wrote {path}", highlight=False)
+    for written in write_report(results):
+        say(f"wrote {written}")
 
 
 @app.command()
 def compare(
-    first: Annotated[Path, typer.Argument(help="folder of results, A")],
-    second: Annotated[Path, typer.Argument(help="folder of results, B")],
+    first: Annotated[Path, typer.Argument(parser=path("A"), help="folder of results, A")],
+    second: Annotated[Path, typer.Argument(parser=path("B"), help="folder of results, B")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="a .csv or .md file to write too")
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            parser=path("-o", "a .csv or .md file"),
+            metavar="FILE",
+            help="a .csv or .md file to write too",
+        ),
     ] = None,
 ) -> None:
     """Compare two folders of results, cell by cell: ratios of times, changes in outcome."""
@@ -186,11 +279,11 @@ def compare(
     if output is not None:
         comparing.write_comparison(found, output)
     for line in found.head():
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+        say(line)
     for table in found.tables():
         console.print(table)
     for line in [*found.foot(), *([f"wrote {output}"] if output else [])]:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+        say(line)
 
 
 @app.command()
@@ -201,8 +294,10 @@ def render(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
     ] = None,
-    steps: Annotated[int, typer.Option(help="time steps")] = 30,
-    every: Annotated[int, typer.Option(help="keep each K-th step")] = 1,
+    steps: Steps = 30,
+    every: Annotated[
+        int, typer.Option(parser=whole("--every"), metavar="K", help="keep each K-th step")
+    ] = 1,
     format_: Annotated[
         str, typer.Option("--format", help="of png, gif, mp4, obj, ply, vtu, with commas")
     ] = "png,gif",
@@ -210,8 +305,11 @@ def render(
     scale: Annotated[
         str | None, typer.Option(help="strain at the colour scale's end, such as 5%; else fitted")
     ] = None,
-    tolerance: Annotated[float, typer.Option(help="aimed at by the solver")] = 1e-6,
-    output: Annotated[Path, typer.Option("-o", "--output", help="folder")] = DEFAULT_PICTURES,
+    tolerance: Tolerance = 1e-6,
+    output: Annotated[
+        Path,
+        typer.Option("-o", "--output", parser=path("-o"), metavar="DIR", help="folder"),
+    ] = DEFAULT_PICTURES,
 ) -> None:
     """Play a scene with one solver; write pictures, animations and mesh series."""
     from strainbench import render as pictures  # matplotlib and meshio only where needed
@@ -233,7 +331,7 @@ def render(
             lambda items, what, total: bar.track(items, total, description=what),
         )
     for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+        say(line)
 
 
 @app.command()
@@ -246,11 +344,23 @@ def polar(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
     ] = None,
-    steps: Annotated[int, typer.Option(help="time steps; the last one is drawn")] = 30,
-    tolerance: Annotated[float, typer.Option(help="aimed at by every solver")] = 1e-6,
-    output: Annotated[Path, typer.Option("-o", "--output", help="an .svg, .png or .pdf file")] = (
-        DEFAULT_PICTURES / "polar.svg"
-    ),
+    steps: Annotated[
+        int,
+        typer.Option(
+            parser=whole("--steps"), metavar="N", help="time steps; the last one is drawn"
+        ),
+    ] = 30,
+    tolerance: Tolerance = 1e-6,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            parser=path("-o", "an .svg, .png or .pdf file"),
+            metavar="FILE",
+            help="an .svg, .png or .pdf file",
+        ),
+    ] = DEFAULT_PICTURES / "polar.svg",
 ) -> None:
     """Draw the limits over the material angle, and the strains a scene ends with."""
     from strainbench.render.polar import polar as draw  # matplotlib only where needed
@@ -266,14 +376,23 @@ def polar(
             lambda items, what, total: bar.track(items, total, description=what),
         )
     for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+        say(line)
 
 
 @app.command()
 def export(
     scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
-    frame: Annotated[int, typer.Option(help="which projection, the first being 1")],
-    output: Annotated[Path, typer.Option("-o", "--output", help="the file to write")],
+    frame: FrameNumber,
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            parser=path("-o", "a file"),
+            metavar="FILE",
+            help="the file to write",
+        ),
+    ],
     format_: Annotated[
         str, typer.Option("--format", help="cbf or npz; by default what the file's name ends in")
     ] = "",
@@ -284,27 +403,28 @@ def export(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
     ] = None,
-    tolerance: Annotated[float, typer.Option(help="aimed at by the solver")] = 1e-6,
+    tolerance: Tolerance = 1e-6,
 ) -> None:
     """Write one projection of a scene as a conic instance (CBF) or as arrays (npz)."""
+    if output.is_dir():
+        raise ValueError(
+            f"-o {output} is a folder: a file is valid, such as {output / 'frame.cbf'}"
+        )
     kind = check_format(format_ or output.suffix.removeprefix("."))
-    cell = plan_one(scenario, solver, set_ or [], max(frame, 1), tolerance)
+    cell = plan_one(scenario, solver, set_ or [], frame, tolerance)
+    open_folder(output.parent, "-o")
     problem = _record(cell, frame)
     before = f"those before by {cell.solver.label}"
     about = f"{cell.scenario.label}, projection {frame}, {before}; strainbench {__version__}"
     write_problem(problem, output, kind, about)
-    console.print(
-        f"wrote {output}: {3 * len(problem.free)} variables, {problem.constraints} constraints",
-        highlight=False,
-        markup=False,
-        soft_wrap=True,
-    )
+    size = f"{3 * len(problem.free)} variables, {problem.constraints} constraints"
+    say(f"wrote {output}: {size}")
 
 
 @app.command("converge")
 def converge_(
     scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
-    frame: Annotated[int, typer.Option(help="which projection, the first being 1")],
+    frame: FrameNumber,
     solver: Annotated[
         list[str] | None,
         typer.Option(help="name, comma-separated names, path of a .py file, or all (default)"),
@@ -313,23 +433,44 @@ def converge_(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
     ] = None,
-    tolerance: Annotated[float, typer.Option(help="the tightest that solvers aim at")] = 1e-8,
-    time_limit: Annotated[float, typer.Option(help="seconds a solver, all its runs")] = 60.0,
-    results: Annotated[Path, typer.Option(help="folder of the results")] = DEFAULT_CONVERGENCE,
+    tolerance: Annotated[
+        float,
+        typer.Option(
+            parser=number("--tolerance"), metavar="X", help="the tightest that solvers aim at"
+        ),
+    ] = 1e-8,
+    time_limit: Annotated[
+        float,
+        typer.Option(
+            parser=number("--time-limit", " of seconds"),
+            metavar="SECONDS",
+            help="a solver, all its runs",
+        ),
+    ] = 60.0,
+    results: Folder = DEFAULT_CONVERGENCE,
 ) -> None:
     """Follow solvers on one projection of a scene: violation, gap and distance against time."""
-    from strainbench.converge import converge  # pebble and the referee only where needed
+    from strainbench.converge import CANDIDATE, converge  # the referee only where needed
     from strainbench.report.convergence import write_convergence
 
     cells = plan_scene(scenario, solver or ["all"], set_ or [], 1, tolerance, time_limit)
+    if all(cell.solver.label == CANDIDATE for cell in cells):
+        there = "the candidate itself is there in any case"
+        raise ValueError(f"--solver {CANDIDATE}: {there}; the names of other solvers are valid")
     problem = _record(recorder(cells[0]), frame)
     memory = 0.75 * psutil.virtual_memory().total / 1024**2
-    with _bar() as bar:
-        ended = converge(cells, problem, frame, results, memory)
-        for cell, ending in bar.track(ended, len(cells), description="solvers"):
-            bar.console.print(f"{cell.solver.label}: {ending}", highlight=False, markup=False)
-    for path in write_convergence(results):
-        console.print(f"wrote {path}", highlight=False)
+    kept = 0
+    try:
+        with _bar() as bar:
+            ended = converge(cells, problem, frame, results, memory)
+            for cell, ending in bar.track(ended, len(cells), description="solvers"):
+                say(f"{cell.solver.label}: {ending}", bar.console)
+                kept += 1
+    except (KeyboardInterrupt, TerminatedError) as end:
+        rows = f"; the rows of {kept} of {len(cells)} solvers are kept" if kept else ""
+        raise InterruptedRunError(end, rows) from None
+    for written in write_convergence(results):
+        say(f"wrote {written}")
 
 
 def _record(cell: Cell, frame: int) -> Problem:
@@ -342,7 +483,7 @@ def _record(cell: Cell, frame: int) -> Problem:
 def _playing(cell: Cell, frame: int) -> Iterator[Callable[[int], None]]:
     """What shows how many projections a scene has asked for, on its way to `frame`."""
     with _bar() as bar:
-        task = bar.add_task(f"playing {cell.title}", total=max(frame - 1, 1))
+        task = bar.add_task(plain(f"playing {cell.title}"), total=max(frame - 1, 1))
         yield lambda asked: bar.update(task, completed=asked - 1)
 
 
@@ -359,16 +500,36 @@ def duel_(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
     ] = None,
-    repeats: Annotated[int, typer.Option(help="turns of each solver on each frame")] = 5,
-    tolerance: Annotated[float, typer.Option(help="aimed at by every solver")] = 1e-6,
-    time_limit: Annotated[float, typer.Option(help="seconds a projection")] = 60.0,
+    repeats: Annotated[
+        int,
+        typer.Option(
+            parser=whole("--repeats"), metavar="N", help="turns of each solver on each frame"
+        ),
+    ] = 5,
+    tolerance: Tolerance = 1e-6,
+    time_limit: Annotated[
+        float,
+        typer.Option(
+            parser=number("--time-limit", " of seconds"), metavar="SECONDS", help="a projection"
+        ),
+    ] = 60.0,
     units: Annotated[
         bool,
         typer.Option("--units", help="beside factorisation + solve, and a step of implicit Euler"),
     ] = False,
-    results: Annotated[Path, typer.Option(help="folder that keeps the frames")] = DEFAULT_DUEL,
+    results: Annotated[
+        Path,
+        typer.Option(parser=path("--results"), metavar="DIR", help="folder that keeps the frames"),
+    ] = DEFAULT_DUEL,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="a .csv or .md file to write too")
+        Path | None,
+        typer.Option(
+            "-o",
+            "--output",
+            parser=path("-o", "a .csv or .md file"),
+            metavar="FILE",
+            help="a .csv or .md file to write too",
+        ),
     ] = None,
 ) -> None:
     """Let solvers take turns on the same projections: ratios of times in one run."""
@@ -377,8 +538,6 @@ def duel_(
 
     sequences = parse_frames(frame)
     last = max(numbers[-1] for numbers in sequences)
-    if repeats < 1:
-        raise ValueError(f"--repeats {repeats}: a whole number above 0 is valid")
     if output is not None:
         check_ending(output)
     cells = plan_scene(scenario, solver, set_ or [], 1, tolerance, time_limit)
@@ -406,12 +565,14 @@ def duel_(
             units,
             lambda: bar.advance(task),
         )
+    for entry, cell in zip(entries, cells, strict=False):  # units of time may follow
+        entry.label = cell.solver.label
     title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
     outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
     Console(width=max(console.width, 200)).print(outcome.table())  # its columns are many
     if output is not None:
         write_outcome(outcome, output)
-        console.print(f"wrote {output}", highlight=False, markup=False, soft_wrap=True)
+        say(f"wrote {output}")
 
 
 @app.command()
@@ -423,9 +584,9 @@ def ledger(
     set_: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE of the scenarios")
     ] = None,
-    steps: Annotated[int, typer.Option(help="time steps")] = 60,
-    tolerance: Annotated[float, typer.Option(help="aimed at by the solver")] = 1e-6,
-    results: Annotated[Path, typer.Option(help="folder of the table")] = DEFAULT_LEDGER,
+    steps: Steps = 60,
+    tolerance: Tolerance = 1e-6,
+    results: Folder = DEFAULT_LEDGER,
 ) -> None:
     """Write what each scene models, and what each part of its physics changes in the answer."""
     from strainbench import ledger as accounts  # pandas only where it is needed
@@ -433,13 +594,13 @@ def ledger(
     names = scenarios or [entry.name for entry in list_scenarios()]
     cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
     with _bar() as bar:
-        paths = accounts.write_ledger(
+        written = accounts.write_ledger(
             cells,
             results,
             lambda items, what, total: bar.track(items, total, description=what),
         )
-    for path in paths:
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+    for file in written:
+        say(f"wrote {file}")
 
 
 def _bar() -> Progress:
@@ -463,7 +624,7 @@ class Display(Observer):
     def __init__(self) -> None:
         self.progress = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=24),
             MofNCompleteColumn(),
             TextColumn("steps,"),
@@ -474,7 +635,7 @@ class Display(Observer):
             console=console,
         )
         self.running: dict[str, int] = {}
-        self.done = 0
+        self.done = self.finished = 0
 
     def __enter__(self) -> Display:
         self.progress.start()
@@ -486,8 +647,9 @@ class Display(Observer):
 
     def planned(self, cells: Sequence[Cell], skipped: int) -> None:
         """See the base class."""
+        self.finished = skipped
         if skipped:
-            console.print(f"{skipped} cells finished before; --rerun runs them again")
+            say(f"{skipped} cells finished before; --rerun runs them again")
         self.progress.update(self.task, total=sum(c.steps for c in cells))
 
     def started(self, cell: Cell) -> None:
@@ -504,42 +666,81 @@ class Display(Observer):
         """See the base class."""
         self.running.pop(cell.title, None)
         self.done += cell.steps
+        self.finished += 1
         seconds = row.get("solve_seconds_mean", "")
         time = f"{float(str(seconds)):.4f} s a solve" if seconds != "" else "no solve"
         reason = f": {row['reason']}" if row["reason"] else ""
-        console.print(f"{cell.title}: {time}, {row['outcome']}{reason}", highlight=False)
+        say(f"{cell.title}: {time}, {row['outcome']}{reason}")
         self._show()
+
+    def waiting(self, what: str) -> None:
+        """See the base class."""
+        say(f"waiting for {what}")
 
     def _show(self) -> None:
         completed = self.done + sum(self.running.values())
         what = " | ".join(self.running) or "the referee"
-        self.progress.update(self.task, completed=completed, description=what)
+        self.progress.update(self.task, completed=completed, description=plain(what))
+
+    def kept(self, planned: int) -> str:
+        """What an interrupted run leaves."""
+        if not self.finished:
+            return "; no cell had finished"
+        finished = f"{self.finished} of {planned}"
+        return f"; every finished cell is kept ({finished}), run the same again to go on"
 
 
 def _print_summary(summary: Summary, planned: int, results: Path) -> None:
     if not summary.cells:
-        console.print(f"nothing to run: all {planned} cells have finished; results in {results}")
+        say(f"nothing to run: all {planned} cells have finished; results in {results}")
         return
-    console.print(
+    say(
         f"{summary.cells} cells in {summary.wall:.1f} s: solvers and physics {summary.play:.1f} s, "
         f"processes' start {summary.start:.1f} s, suite overhead {100 * summary.overhead:.1f}% "
-        f"of the wall time; the referee worked {summary.judging:.1f} s while processes started",
-        highlight=False,
+        f"of the wall time; the referee worked {summary.judging:.1f} s while processes started"
     )
-    console.print(f"results in {results}", highlight=False)
+    say(f"results in {results}")
+
+
+def _terminate(*_: object) -> None:
+    """End like Ctrl-C, once."""
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    raise TerminatedError
 
 
 def main() -> None:
-    """Run the command line; exit 2 with one line for a wrong word, 130 when interrupted."""
+    """Run the command line; exit 2 for a wrong word, 1 for our own fault or the disk's.
+
+    130 and 143 after Ctrl-C and SIGTERM. Each is one line; with STRAINBENCH_DEBUG set, a fault of
+    ours shows where it is.
+    """
+    signal.signal(signal.SIGTERM, _terminate)
+    status, line = _run()
+    if line:
+        say(f"strainbench: {line}", errors)
+    sys.exit(status)
+
+
+def _run() -> tuple[int, str]:
+    """The exit status, and what there is to say of it."""
     try:
-        status = app(standalone_mode=False)
+        status = app(standalone_mode=False) or 0
     except typer.TyperException as error:
         message = getattr(error, "format_message", error.__str__)()
-        errors.print(f"strainbench: {message} (strainbench --help lists what is valid)")
-        sys.exit(2)
-    except (ValueError, RecordsError) as error:
-        errors.print(f"strainbench: {error}", markup=False)
-        sys.exit(2)
-    if status == INTERRUPTED:  # typer has turned KeyboardInterrupt into it
-        errors.print("strainbench: interrupted; every finished cell is kept, run again to resume")
-    sys.exit(status or 0)
+        return 2, f"{message} (strainbench --help lists what is valid)"
+    except InterruptedRunError as interrupt:
+        return interrupt.status, f"interrupted{interrupt}"
+    except TerminatedError:
+        return TERMINATED, "interrupted"
+    except DiskError as error:
+        return 1, str(error)
+    except (ValueError, WrongWordError) as error:
+        return 2, str(error)
+    except OSError as error:
+        return 1, f"{error.filename or 'a file'}: {error.strerror or error}"
+    except Exception as error:
+        if os.environ.get(DEBUG):
+            raise
+        return 1, f"a fault of its own, {told(error)}; {DEBUG}=1 shows where"
+    # typer has turned KeyboardInterrupt into a status
+    return status, "interrupted" if status == INTERRUPTED else ""

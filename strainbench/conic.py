@@ -48,7 +48,7 @@ class ConicForm:
         self.scale, self.unit = 1.0, 1.0
         if scaling is not None:
             self.unit = problem.edge_length
-            self.scale = scaling / (self.unit**2 * float(problem.weights.mean()))
+            self.scale = scaling / (self.unit**2 * problem.mean_weight)
         weights = np.repeat(problem.weights[problem.free], 3)
         self.P = sp.csc_array(sp.diags_array(self.scale * self.unit**2 * weights))
         self.count = problem.constraints

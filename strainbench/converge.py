@@ -9,26 +9,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from pebble import ProcessPool
-
 from strainbench.cell import Cell
 from strainbench.export import write_problem
+from strainbench.folder import locked
 from strainbench.isolation import Running
 from strainbench.limits import FloatArray
 from strainbench.machine import describe_machine, fixed_threads
 from strainbench.play import read_events, read_frames
 from strainbench.problem import Problem
+from strainbench.process import family
 from strainbench.records import (
     RecordsError,
-    append_rows,
     open_folder,
     read_rows,
     remember_machine,
+    write_rows,
 )
 from strainbench.referee import certify
 from strainbench.reference import content_key, reference_of
@@ -106,9 +105,16 @@ def converge(
     Raises
     ------
     RecordsError
-        If the folder cannot be written to, or holds another frame.
+        If the folder cannot be written to, is in use, or holds another frame.
     """
     open_folder(folder)
+    with locked(folder):
+        yield from _converge(cells, problem, number, folder, memory_limit_mb)
+
+
+def _converge(
+    cells: Sequence[Cell], problem: Problem, number: int, folder: Path, memory_limit_mb: float
+) -> Iterator[tuple[Cell, str]]:
     check_folder(folder, problem)
     machine, about = describe_machine(threads=1)
     remember_machine(folder, machine, about)
@@ -145,23 +151,17 @@ def keep(folder: Path, rows: Rows) -> None:
     """Write down a solver's rows in place of those that it had."""
     path = folder / CONVERGENCE
     others = [r for r in read_rows(path, COLUMNS) if r["solver"] != rows[0]["solver"]]
-    part = path.with_suffix(".part")
-    part.unlink(missing_ok=True)
-    append_rows(part, COLUMNS, [*others, *rows])
-    part.replace(path)
+    write_rows(path, COLUMNS, [*others, *rows])
 
 
 def run_alone(cell: Cell, folder: Path, frame: Path, memory_limit_mb: float) -> Running:
     """Run a cell in a process of its own, to its end."""
-    with ProcessPool(1, max_tasks=1, context=get_context("spawn")) as pool:
-        try:
-            item = Running.start(pool, cell, folder, frame, memory_limit_mb, trace)
-            while not item.has_ended():
-                if item.is_ready():
-                    item.release()
-                time.sleep(POLL_SECONDS)
-        finally:
-            pool.stop()
+    with family() as ours:
+        item = Running.start(ours, cell, folder, frame, memory_limit_mb, trace)
+        while not item.has_ended():
+            if item.is_ready():
+                item.release()
+            time.sleep(POLL_SECONDS)
     return item
 
 

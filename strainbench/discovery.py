@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import ast
+import difflib
 import hashlib
 import importlib
-import importlib.util
 import inspect
 import pkgutil
 import sys
-from collections.abc import Iterator
+import traceback
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import TypeVar
 
+from strainbench.beside import OURS, Beside
+from strainbench.escape import plain
 from strainbench.scenario import Scenario
 from strainbench.solver import Solver, method_and_paper, warm_twin
 
-OURS = ("strainbench", "solvers", "scenarios")
 Plugin = TypeVar("Plugin", Solver, Scenario)
 
 
@@ -148,8 +150,11 @@ def find_solver(name: str) -> Solver:
     """
     if solver := _ours(name):
         return solver
-    valid = ", ".join(e.name for e in list_solvers())
-    raise ValueError(f"no solver called {name!r}; valid are {valid}, or the path of a .py file")
+    valid = [e.name for e in list_solvers()]
+    raise ValueError(
+        f"no solver called {name!r}; valid are {', '.join(valid)}, or the path of a .py file"
+        f"{nearest(name, valid)}"
+    )
 
 
 def find_scenario(name: str) -> type[Scenario]:
@@ -157,8 +162,17 @@ def find_scenario(name: str) -> type[Scenario]:
     for stem in _stems("scenarios"):
         if stem.replace("_", "-") == name:
             return _classes(_load("scenarios", stem), Scenario)[0]
-    valid = ", ".join(e.name for e in list_scenarios())
-    raise ValueError(f"no scenario called {name!r}; valid are {valid}, or the path of a .py file")
+    valid = [e.name for e in list_scenarios()]
+    raise ValueError(
+        f"no scenario called {name!r}; valid are {', '.join(valid)}, or the path of a .py file"
+        f"{nearest(name, valid)}"
+    )
+
+
+def nearest(word: str, valid: Iterable[str]) -> str:
+    """A word in brackets that one may have meant, or nothing."""
+    close = difflib.get_close_matches(word.lower(), list(valid), n=1)
+    return f" (did you mean {close[0]}?)" if close else ""
 
 
 def load_file(path: str, base: type[Plugin]) -> list[type[Plugin]]:
@@ -169,29 +183,68 @@ def load_file(path: str, base: type[Plugin]) -> list[type[Plugin]]:
     ValueError
         One line: the file is not there, does not import, defines none, or takes a name of ours.
     """
-    file = Path(path).resolve()
     kind = base.__name__.lower()
-    if not file.is_file():
-        raise ValueError(f"{path}: no such file")
-    digest = hashlib.sha256(str(file).encode()).hexdigest()[:12]
-    name = f"strainbench_file_{file.stem}_{digest}"
-    spec = importlib.util.spec_from_file_location(name, file)
-    if spec is None or spec.loader is None:
-        raise ValueError(f"{path}: not a Python file")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:  # whatever a user's file raises becomes one line
-        del sys.modules[name]
-        raise ValueError(f"{path} does not import: {type(error).__name__}: {error}") from error
+    module = _execute(path)
     classes = _classes(module, base)
     if not classes:
-        raise ValueError(f"{path} defines no {kind}: a subclass of strainbench.{base.__name__}")
+        halves = [f"{c.__name__} lacks {_lacking(c)}" for c in _halves(module, base)]
+        wanted = f"a subclass of strainbench.{base.__name__}"
+        raise ValueError(f"{path} defines no {kind}: {', '.join(halves) or wanted}")
     for c in classes:
-        if not isinstance(getattr(c, "name", None), str):
+        name = getattr(c, "name", None)
+        if not isinstance(name, str) or not name.strip():
             raise ValueError(f'{path}: the {kind} {c.__name__} has no name = "..."')
-        if c.name in [t.replace("_", "-") for t in _stems(f"{kind}s")] or _ours(c.name):
-            taken = f"the name {c.name!r} is taken by our own {kind}"
+        if name in [t.replace("_", "-") for t in _stems(f"{kind}s")] or _ours(name):
+            taken = f"the name {name!r} is taken by our own {kind}"
             raise ValueError(f"{path}: {taken}; choose another")
     return classes
+
+
+def _execute(path: str) -> ModuleType:
+    """The module of a file, run anew."""
+    file = Path(path).resolve()
+    if file.is_dir():
+        inside = ", ".join(sorted(str(Path(path, f.name)) for f in file.glob("*.py"))[:3])
+        such = f", such as {inside}" if inside else ""
+        raise ValueError(f"{path} is a folder, no such file: the path of a .py file is valid{such}")
+    if not file.is_file():
+        raise ValueError(f"{path}: no such file")
+    if file.suffix != ".py":
+        raise ValueError(f"{path}: not a Python file")
+    name = f"strainbench_file_{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
+    module = ModuleType(name)
+    module.__file__ = str(file)
+    sys.modules[name] = module  # where dataclasses look for it
+    try:
+        Beside(file).execute(module, compile(file.read_bytes(), str(file), "exec"))
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever a user's file raises, SystemExit too, is one line
+        del sys.modules[name]
+        raise ValueError(f"{path} does not import: {told(error, str(file))}") from error
+    return module
+
+
+def told(error: BaseException, file: str = "") -> str:
+    """An exception in one line, with the last line of `file` that it passed through."""
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    where = f" (line {lines[-1]})" if lines else ""
+    try:
+        words = plain(error)
+    except Exception:
+        words = "what it says cannot be shown"
+    return f"{type(error).__name__}{': ' if words else ''}{words}{where}"
+
+
+def _halves(module: ModuleType, base: type[Plugin]) -> list[type[Plugin]]:
+    """The abstract plug-in classes that a module defines itself."""
+    return [
+        c
+        for c in vars(module).values()
+        if inspect.isclass(c) and issubclass(c, base) and c.__module__ == module.__name__
+    ]
+
+
+def _lacking(kind: type) -> str:
+    """The methods that an abstract class leaves open."""
+    return ", ".join(sorted(getattr(kind, "__abstractmethods__", ())))

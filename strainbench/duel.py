@@ -25,6 +25,7 @@ from threadpoolctl import threadpool_limits
 from strainbench.frame import Recording
 from strainbench.limits import FloatArray
 from strainbench.machine import fixed_threads
+from strainbench.options import shown
 from strainbench.physics.linear import best_linear_solver
 from strainbench.physics.pattern import Pattern
 from strainbench.problem import Problem
@@ -32,6 +33,7 @@ from strainbench.referee import Certificate, certify
 from strainbench.reference import ReferenceSolver
 from strainbench.solver import Solution, Solver, run_solver, warm_up
 
+MOST_FRAMES = 100_000  # all their targets are in memory
 FACTORISATION, IMPLICIT_EULER = "factorisation + solve", "implicit Euler step"
 
 
@@ -104,7 +106,9 @@ def parse_frames(text: str) -> list[list[int]]:
     except ValueError:
         ends = []
     if not ends or any(len(e) > 2 or e[0] < 1 or e[-1] < e[0] for e in ends):
-        raise ValueError(f"--frame {text}: whole numbers above 0 and ranges, as in 5,14-29")
+        raise ValueError(f"--frame {shown(text)}: whole numbers above 0 and ranges, as in 5,14-29")
+    if (last := max(e[-1] for e in ends)) > MOST_FRAMES:
+        raise ValueError(f"--frame {text}: {last} is too many; up to {MOST_FRAMES} is valid")
     return [list(range(e[0], e[-1] + 1)) for e in ends]
 
 
@@ -187,7 +191,7 @@ class Factorisation:
     """The unit that one numeric factorisation and one solve of a mesh's matrix make."""
 
     def __init__(self, problem: Problem) -> None:
-        pattern = Pattern.of([problem.elements], problem.vertices, problem.pinned)
+        pattern = Pattern.of([problem.elements], problem.vertices, problem.held)
         matrix = pattern.matrix()
         self._linear = best_linear_solver(matrix)
         self._data = np.ones(len(pattern.indices))

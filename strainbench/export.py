@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from strainbench.cbf import cbf_text
 from strainbench.conic import ConicForm
 from strainbench.limits import StretchLimits
+from strainbench.options import shown
 from strainbench.problem import Problem
 from strainbench.records import open_folder
 
@@ -40,7 +41,7 @@ from strainbench.records import open_folder
 def check_format(kind: str) -> str:
     """`kind`, if it is one of FORMATS; else ValueError."""
     if kind not in FORMATS:
-        raise ValueError(f"--format {kind}: valid are {', '.join(FORMATS)}")
+        raise ValueError(f"--format {shown(kind)}: valid are {', '.join(FORMATS)}")
     return kind
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from strainbench.cell import Cell, PluginRef
 from strainbench.discovery import find_solver
+from strainbench.folder import locked, open_folder
 from strainbench.limits import FloatArray
 from strainbench.problem import Problem
 from strainbench.reference import REFERENCE_SOLVER
@@ -116,8 +117,9 @@ def recorded(
     file = folder / f"{cell.recording_key}-{number}.npy"
     if not file.exists():
         recording = record_all(cell, number, progress)
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part.npy")
-        np.save(part, recording.targets)
-        part.replace(file)
+        open_folder(folder)
+        with locked(folder):
+            part = file.with_suffix(".part.npy")
+            np.save(part, recording.targets)
+            part.replace(file)
     return Recording(cell.scenario.scenario().problem(), np.load(file), np.empty(0))

@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench.limits import FloatArray
-from strainbench.problem import Problem
+from strainbench.problem import IntArray, Problem
 from strainbench.reference import objective_floor
 
 NEAR = 1e-5
@@ -45,33 +45,34 @@ def kkt_residual(problem: Problem, positions: FloatArray) -> float:
     """
     if problem.limits.spectral:
         raise ValueError("limits: the KKT residual is that of sampled directions")
-    if len(problem.free) == 0:
+    movable = np.setdiff1d(np.arange(problem.vertices), problem.pinned)
+    if len(movable) == 0:
         return 0.0
-    root = np.sqrt(problem.weights[problem.free, None])
-    force = (root * (positions - problem.target)[problem.free]).T.ravel()
+    root = np.sqrt(problem.weights[movable, None])
+    force = (root * (positions - problem.target)[movable]).T.ravel()
     scale = max(float(np.linalg.norm(force)), float(np.sqrt(2 * objective_floor(problem))))
-    normals = _active_normals(problem, positions)
+    normals = _active_normals(problem, positions, movable)
     if normals.shape[1] == 0:
         return float(np.linalg.norm(force)) / scale
     multipliers = _nonnegative_least_squares(normals, -force / scale)
     return float(np.linalg.norm(normals @ multipliers + force / scale))
 
 
-def _active_normals(problem: Problem, positions: FloatArray) -> sp.csc_array:
-    """(3 free, active) outward normals M^-1/2 g_i u_i of the active limits, of unit length."""
+def _active_normals(problem: Problem, positions: FloatArray, movable: IntArray) -> sp.csc_array:
+    """(3 movable, active) outward normals M^-1/2 g_i u_i of the active limits, of unit length."""
+    root = np.sqrt(problem.weights[movable, None])
     y = problem.G @ positions
     s = np.linalg.norm(y, axis=1)
-    upper = np.flatnonzero(s > problem.bounds - NEAR)
+    upper = np.flatnonzero((s > problem.bounds - NEAR) & (s > 0))
     lower = np.flatnonzero((s < problem.lower_bounds + NEAR) & (s > 0))
     rows = np.concatenate([upper, lower])
     sign = np.repeat([1.0, -1.0], [len(upper), len(lower)])
     u = sign[:, None] * y[rows] / s[rows, None]
-    root = np.sqrt(problem.weights[problem.free])
-    g = sp.csc_array(problem.G[rows][:, problem.free].T / root[:, None])
+    g = sp.csc_array(problem.G[rows][:, movable].T / root)
     normals = sp.csc_array(sp.vstack([g * a for a in u.T]))
     length = sp.linalg.norm(normals, axis=0)
-    movable = length > 0
-    return sp.csc_array(normals[:, movable] / length[movable])
+    turns = length > 0
+    return sp.csc_array(normals[:, turns] / length[turns])
 
 
 def _nonnegative_least_squares(A: sp.csc_array, b: FloatArray) -> FloatArray:

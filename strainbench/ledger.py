@@ -21,7 +21,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from strainbench import escape
 from strainbench.cell import Cell
+from strainbench.folder import locked, write_whole
 from strainbench.limits import FloatArray
 from strainbench.machine import describe_machine
 from strainbench.physics.cloth import Cloth, Material
@@ -265,14 +267,16 @@ def write_ledger(cells: Sequence[Cell], folder: Path, track: Track = untracked) 
         if cell.solver.unavailable:
             raise ValueError(cell.solver.unavailable)
     plays = (row for cell in cells for row in ledger(cell))
-    rows = list(track(plays, "playing", len(cells) * (2 + len(PARTS))))
     name, facts = describe_machine(1)
-    remember_machine(folder, name, facts)
     first = cells[0]
     about = f"{first.steps} steps, {first.solver.label}, tolerance {first.tolerance:g}; {name}."
     paths = [folder / "ledger.csv", folder / "ledger.md"]
-    pd.DataFrame([asdict(row) for row in rows]).convert_dtypes().to_csv(paths[0], index=False)
-    paths[1].write_text(as_markdown(rows, about))
+    with locked(folder):
+        rows = list(track(plays, "playing", len(cells) * (2 + len(PARTS))))
+        remember_machine(folder, name, facts)
+        table = pd.DataFrame([asdict(row) for row in rows]).convert_dtypes()
+        write_whole(paths[0], table.map(escape.cell).to_csv(index=False).encode())
+        write_whole(paths[1], as_markdown(rows, about).encode())
     return paths
 
 
@@ -288,7 +292,7 @@ def as_markdown(rows: list[Row], about: str) -> str:
         for r in rows
         if r.change != AS_IT_IS
     ]
-    parts = ["# Model ledger", about, _table(MODELS, models)]
+    parts = ["# Model ledger", escape.markdown(about), _table(MODELS, models)]
     parts += ["## What each part changes", EXPLANATION, _table(EFFECTS, effects)]
     return "\n\n".join(parts) + "\n"
 
@@ -317,4 +321,4 @@ def _table(header: str, rows: Sequence[tuple[object, ...]]) -> str:
 def _text(value: object) -> str:
     if value is None:
         return ""
-    return f"{value:.2g}" if isinstance(value, float) else str(value)
+    return f"{value:.2g}" if isinstance(value, float) else escape.markdown(value)

@@ -2,26 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import fields
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, fields, replace
 from itertools import product
+from math import isqrt
 from pathlib import Path
-from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any
+
+import psutil
 
 from strainbench.cell import Cell, PluginRef
 from strainbench.discovery import (
+    Plugin,
     UnavailableError,
     find_scenario,
     find_solver,
     list_solvers,
     load_file,
+    nearest,
+    told,
 )
+from strainbench.fields import SETTABLE, NotSettableError, default_of, hints, read
+from strainbench.fields import words as words_of
+from strainbench.options import MOST, shown
 from strainbench.scenario import Scenario
 from strainbench.solver import Solver, warm_twin
 
 MODES = ("simulate", "replay")
 STARTS = ("cold", "warm")
+BYTES_A_CELL = 472
+"""Of a square of two triangles, at least: its vertex, its indices, its rows of the constraints."""
 Choices = dict[str, dict[str, list[str]]]
 """Values by owner ("" where none was named) and key."""
 
@@ -38,77 +50,143 @@ def parse_settings(words: Iterable[str]) -> Choices:
         key, equals, values = word.partition("=")
         owner, _, name = key.rpartition(".")
         if not equals or not name or not values:
-            raise ValueError(f"--set {word}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
+            raise ValueError(f"--set {shown(word)}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
         choices.setdefault(owner, {}).setdefault(name, []).extend(values.split(","))
     return choices
 
 
-def parse_value(owner: str, key: str, hint: Any, text: str) -> object:
-    """A value of a field's type; percentages are numbers too: 1% is 0.01."""
-    kinds = get_args(hint) if get_origin(hint) in (UnionType, Union) else (hint,)
+def parse_value(owner: str, key: str, hint: Any, text: str, file: str = "") -> object:
+    """A value of a field's type; one line for what is none, which names the field and the file."""
     try:
-        if type(None) in kinds and text.lower() == "none":
-            return None
-        if bool in kinds:
-            return {"true": True, "false": False}[text.lower()]
-        if int in kinds and (str not in kinds or text.lstrip("-").isdigit()):
-            return int(text)
-        if float in kinds:
-            return float(text[:-1]) / 100 if text.endswith("%") else float(text)
-    except (KeyError, ValueError):
-        names = " or ".join("none" if k is type(None) else k.__name__ for k in kinds)
-        raise ValueError(f"--set {owner}.{key}={text}: the value must be {names}") from None
-    return text
+        return read(hint, text)
+    except ValueError:
+        valid = f"the value must be {words_of(hint)}"
+        raise ValueError(f"--set {owner}.{key}={text}: {valid}") from None
+    except NotSettableError:
+        what = f"{key} of {owner}{f' in {file}' if file else ''} is a {words_of(hint)}"
+        raise ValueError(f"--set {owner}.{key}: {what}; valid are {SETTABLE}") from None
 
 
-def variations(plugin: type[Scenario] | Solver, choices: Choices, shared: bool) -> list[Any]:
-    """A plug-in with every combination of the values chosen for its fields."""
-    kind = plugin if isinstance(plugin, type) else type(plugin)
-    base: dict[str, Any] = {} if isinstance(plugin, type) else plugin.parameters
-    chosen = dict(choices.get("", {})) if shared else {}
-    chosen |= choices.get(kind.name, {})
-    hints = get_type_hints(kind)
-    names = [f.name for f in fields(kind)]
+def combinations(
+    kind: type[Scenario] | type[Solver], choices: Choices, shared: bool, file: str = ""
+) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
+    """Every combination of the values chosen for a plug-in's fields, and the words for them."""
+    chosen = (dict(choices.get("", {})) if shared else {}) | choices.get(kind.name, {})
+    types = hints(kind)
     for key in chosen:
-        if key not in names:
-            raise ValueError(f"{kind.name} has no setting {key!r}; valid are {', '.join(names)}")
-    values = [[parse_value(kind.name, k, hints[k], v) for v in vs] for k, vs in chosen.items()]
-    combinations: list[dict[str, Any]] = [
-        dict(zip(chosen, combination, strict=True)) for combination in product(*values)
+        if key not in types:
+            raise ValueError(_no_setting(kind, key, list(types), file))
+    defaults = {f.name: default_of(f) for f in fields(kind)}
+    values = [
+        [(_as_default(parse_value(kind.name, k, types[k], w, file), defaults[k]), w) for w in ws]
+        for k, ws in chosen.items()
     ]
+    for combination in product(*values):
+        pairs = dict(zip(chosen, combination, strict=True))
+        yield {k: value for k, (value, _) in pairs.items()}, {k: w for k, (_, w) in pairs.items()}
+
+
+def _no_setting(kind: type, key: str, valid: list[str], file: str) -> str:
+    name = getattr(kind, "name", kind.__name__)
+    if any(key in vars(c).get("__annotations__", {}) for c in kind.__mro__):
+        return f"{name} has no setting {key!r}: {kind.__name__} in {file} is no @dataclass"
+    found = f"valid are {', '.join(valid)}{nearest(key, valid)}" if valid else "it has none at all"
+    return f"{name} has no setting {key!r}; {found}"
+
+
+def _as_default(value: object, default: object) -> object:
+    """The default itself where it is the same number, so that 1 and 1.0 are one cell."""
+    numbers = all(type(v) in (int, float) for v in (value, default))
+    return default if numbers and value == default else value
+
+
+@contextmanager
+def blaming(name: str, file: str | None) -> Iterator[None]:
+    """Name the plug-in whose values are not valid, and the file whose code raises anything else."""
     try:
-        return [kind(**{**base, **settings}) for settings in combinations]
+        yield
     except ValueError as error:
-        raise ValueError(f"{kind.name}: {error}") from None
+        raise ValueError(f"{name}: {error}") from None
+    except Exception as error:
+        if file is None:  # a fault of ours
+            raise
+        raise ValueError(f"{file}: {name}: {told(error, str(Path(file).resolve()))}") from None
 
 
 def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
     """The scenarios named, or given as files, with every combination of settings."""
     refs = []
     for word in words:
-        classes = load_file(word, Scenario) if is_file(word) else [find_scenario(word)]
-        path = str(Path(word).resolve()) if is_file(word) else None
-        refs += [PluginRef.of(s, path) for c in classes for s in variations(c, choices, True)]
+        file = word if is_file(word) else None
+        path = str(Path(word).resolve()) if file else None
+        for kind in with_defaults(word, Scenario) if file else [find_scenario(word)]:
+            for settings, spelling in combinations(kind, choices, True, file or ""):
+                with blaming(kind.name, file):
+                    scene = kind(**settings)
+                    check_size(scene)
+                    label = scene.labelled(spelling) if spelling else None
+                    refs.append(PluginRef.of(scene, path, label))
     return refs
+
+
+def check_size(scene: Scenario) -> None:
+    """ValueError for a resolution at which the arrays alone are larger than the machine."""
+    need = BYTES_A_CELL * scene.resolution**2
+    total = psutil.virtual_memory().total
+    if need > total:
+        raise ValueError(
+            f"resolution is {scene.resolution}: its arrays need {need / 1e9:.0f} GB or more and "
+            f"this machine has {total / 1e9:.0f}; up to {isqrt(total // BYTES_A_CELL)} is valid"
+        )
+
+
+def split_names(words: Sequence[str]) -> list[str]:
+    """The names and paths of a command line; a comma is between two unless a file has it."""
+    return [n for w in words for n in ([w] if is_file(w) and Path(w).exists() else w.split(","))]
 
 
 def plan_solvers(words: Sequence[str], choices: Choices, starts: Sequence[str]) -> list[PluginRef]:
     """The solvers named, or given as files; "all" is every one of ours, unavailable ones too."""
-    names = [n for w in words for n in ([w] if is_file(w) else w.split(","))]
+    names = split_names(words)
     if "all" in names:
         ours = [e.name for e in list_solvers()]
         names = [n for name in names for n in (ours if name == "all" else [name])]
     refs: list[PluginRef] = []
+    found: list[tuple[str | None, Solver]] = []
     for name in dict.fromkeys(names):
-        path = str(Path(name).resolve()) if is_file(name) else None
         try:
-            found = from_file(name) if path else [find_solver(name)]
+            made = from_file(name) if is_file(name) else [find_solver(name)]
         except UnavailableError as error:
             refs += [PluginRef(name, name, unavailable=str(error))] if "cold" in starts else []
             continue
-        varied = [v for s in found for v in variations(s, choices, False)]
-        refs += [PluginRef.of(v, path) for s in varied for v in by_start(s, starts)]
-    return list(dict.fromkeys(refs))
+        found += [(name if is_file(name) else None, solver) for solver in made]
+    for file, solver in found:
+        others = {f and Path(f).resolve() for f, s in found if s.name == solver.name}
+        where = (
+            f" ({'/'.join(Path(file).resolve().parts[-2:])})" if file and len(others) > 1 else ""
+        )
+        refs += _varied(solver, choices, starts, file, where)
+    return list({json.dumps([r.name, r.label, r.identity]): r for r in refs}.values())
+
+
+def _varied(
+    solver: Solver, choices: Choices, starts: Sequence[str], file: str | None, where: str
+) -> list[PluginRef]:
+    """References to a solver with every combination of settings, cold and warm.
+
+    The label is what was typed: its name, or its variant's, and all that was set.
+    """
+    path = str(Path(file).resolve()) if file else None
+    refs = []
+    with blaming(solver.name, file):
+        label = str(solver.label).removesuffix("-warm" if solver.starts_warm else "") + where
+    for settings, spelling in combinations(type(solver), choices, False, file or ""):
+        shown = ",".join(f"{k}={w}" for k, w in spelling.items() if k != "warm")
+        named = f"{label}[{shown}]" if shown else label
+        with blaming(solver.name, file):
+            for s in by_start(replace(solver, **settings), starts):
+                refs.append(PluginRef.of(s, path, named + ("-warm" if s.starts_warm else "")))
+    return refs
 
 
 def by_start(solver: Solver, starts: Sequence[str]) -> list[Solver]:
@@ -124,23 +202,38 @@ def never_warm(solvers: Sequence[str]) -> list[str]:
     return [ref.label for ref in refs if "warm" not in dict(ref.parameters)]
 
 
-def from_file(path: str) -> list[Solver]:
+def from_file(file: str) -> list[Solver]:
     """The solvers of a file, as they are by default."""
     found = []
-    for kind in load_file(path, Solver):
-        try:
+    for kind in with_defaults(file, Solver):
+        with blaming(kind.name, file):
             found.append(kind())
-        except TypeError as error:
-            raise ValueError(f"{path}: every field needs a default ({error})") from None
     return found
 
 
-def steps_for(scene: PluginRef, duration: float) -> int:
-    """The time steps of a scene that come nearest to `duration` [s], at least one."""
+def with_defaults(file: str, base: type[Plugin]) -> list[type[Plugin]]:
+    """The plug-ins of a file; ValueError names the fields without a default."""
+    classes = load_file(file, base)
+    for kind in classes:
+        with blaming(kind.name, file):
+            bare = ", ".join(f.name for f in fields(kind) if f.init and default_of(f) is MISSING)
+        if bare:
+            has_none = f"{bare} of {kind.__name__} has none"
+            raise ValueError(f"{file}: every field needs a default; {has_none}")
+    return classes
+
+
+def steps_for(scene: PluginRef, duration: float | None) -> int:
+    """The time steps of a scene that come nearest to `duration` [s], at least one, or its own."""
+    if duration is None:
+        return scene.scenario().usual_steps
     step = dict(scene.parameters).get("step")
     if not isinstance(step, int | float):
         raise ValueError(f"--duration {duration:g}: no time passes in {scene.name}; give --steps")
-    return max(1, round(duration / step))
+    steps = max(1.0, duration / step)
+    if steps > MOST:
+        raise ValueError(f"--duration {duration:g}: {steps:.3g} steps of {scene.name} are too many")
+    return round(steps)
 
 
 def plan(
@@ -148,14 +241,15 @@ def plan(
     solvers: Sequence[str],
     settings: Sequence[str],
     mode: str,
-    steps: int,
+    steps: int | None,
     tolerances: Sequence[float],
     time_limit: float | None,
     duration: float | None = None,
     starts: Sequence[str] = ("cold",),
     threads: int = 1,
 ) -> list[Cell]:
-    """All cells of a run; with a `duration` [s] each has its own number of steps, and not `steps`.
+    """All cells of a run; each scene has its own number of steps with a `duration` [s], and where
+    neither that nor `steps` is given.
 
     Parameters
     ----------
@@ -167,9 +261,9 @@ def plan(
         One line that names the wrong word and what is valid.
     """
     if mode not in MODES:
-        raise ValueError(f"--mode {mode}: valid are {', '.join(MODES)}")
+        raise ValueError(f"--mode {shown(mode)}: valid are {', '.join(MODES)}")
     for name, count in (("--steps", steps), ("--threads", threads)):
-        if count < 1:
+        if count is not None and count < 1:
             raise ValueError(f"{name} {count}: a whole number above 0 is valid")
     times = (("--time-limit", [time_limit]), ("--duration", [duration]))
     for name, values in (("--tolerance", tolerances), *times):
@@ -177,7 +271,7 @@ def plan(
             if value is not None and not 0 < value < float("inf"):
                 raise ValueError(f"{name} {value}: a number above 0 is valid")
     if not starts or not set(starts) <= set(STARTS):
-        raise ValueError(f"--start {','.join(starts)}: valid are cold, warm and cold,warm")
+        raise ValueError(f"--start {shown(','.join(starts))}: valid are cold, warm and cold,warm")
     choices = parse_settings(settings)
     scenes = plan_scenarios(scenarios, choices)
     methods = plan_solvers(solvers, choices, starts)
@@ -188,10 +282,15 @@ def plan(
         if owner and owner not in owners:
             valid = ", ".join(sorted(owners))
             raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
-    counts = {s: steps if duration is None else steps_for(s, duration) for s in scenes}
+    counts = [
+        steps_for(scene, duration) if duration is not None or steps is None else steps
+        for scene in scenes
+    ]
     cells = [
-        Cell(scene, method, mode, counts[scene], tolerance, time_limit, threads)
-        for scene, method, tolerance in product(scenes, methods, tolerances)
+        Cell(scene, method, mode, count, tolerance, time_limit, threads)
+        for (scene, count), method, tolerance in product(
+            zip(scenes, counts, strict=True), methods, tolerances
+        )
     ]
     return list({cell.key: cell for cell in cells}.values())
 

@@ -11,19 +11,26 @@ the columns of F_e D, and the largest singular value of these together is bounde
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import ConvexHull, QhullError
 
 from strainbench.limits import FloatArray, StretchLimits, frozen_array
 
 IntArray = NDArray[np.int64]
+Value = TypeVar("Value")
+Scalar = TypeVar("Scalar", np.int64, np.float64)
+
+ROUNDING = 4 * np.finfo(float).eps  # of a unit length
+FLAT = 1e-9  # a hull that is thinner, for its length, tells nothing
 
 
 def _index_array(name: str, values: ArrayLike, ndim: int, vertices: int) -> IntArray:
@@ -49,7 +56,7 @@ def _index_array(name: str, values: ArrayLike, ndim: int, vertices: int) -> IntA
     return array
 
 
-def _read_only(array: FloatArray) -> FloatArray:
+def _read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
     array.setflags(write=False)
     return array
 
@@ -90,6 +97,19 @@ def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, F
     return _read_only(gradients), _read_only(np.abs(determinant) / (2 if dim == 2 else 6))
 
 
+def _of_mesh(compute: Callable[[Problem], Value]) -> cached_property[Value]:
+    """A cached property that the frames of one mesh share, whichever of them is asked first."""
+
+    def shared(problem: Problem) -> Value:
+        values: dict[str, Value] = problem._mesh  # type: ignore[attr-defined]
+        if compute.__name__ not in values:
+            values[compute.__name__] = compute(problem)
+        return values[compute.__name__]
+
+    shared.__doc__ = compute.__doc__
+    return cached_property(shared)
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Closest positions to a target in which no limited direction is stretched too far.
@@ -111,7 +131,8 @@ class Problem:
     mass : (n,), optional
         Vertex masses [kg], the weights M of the norm; None is the unweighted norm of Eq. 5.
 
-    All arrays are copied and read-only.
+    All arrays are copied and read-only. A vertex in no element belongs at its target, and is held
+    there like a pinned one.
 
     Raises
     ------
@@ -166,6 +187,7 @@ class Problem:
                     f"limits.{name}: {len(array)} rows for {len(self.elements)} elements"
                 )
         put("_shape", shape_gradients(self.rest, self.elements))
+        put("_mesh", {})
 
     def _checked_target(self, target: ArrayLike) -> FloatArray:
         array = frozen_array("target", target, 2)
@@ -210,6 +232,9 @@ class Problem:
             bounds = limits.bounds - margin
         lower = None if limits.lower is None else limits.lower + margin
         object.__setattr__(other, "limits", replace(limits, bounds=bounds, lower=lower))
+        mesh = {k: v for k, v in self._mesh.items() if k not in ("bounds", "lower_bounds")}  # type: ignore[attr-defined]
+        mesh["_reach"] = self._reach * float(np.max(bounds / limits.bounds))
+        object.__setattr__(other, "_mesh", mesh)
         for name in ("bounds", "lower_bounds", "_reach"):
             other.__dict__.pop(name, None)
         return other
@@ -246,14 +271,28 @@ class Problem:
         measures: FloatArray = self._shape[1]  # type: ignore[attr-defined]
         return measures
 
-    @cached_property
-    def free(self) -> IntArray:
-        """Indices of the vertices that are not pinned."""
-        free = np.setdiff1d(np.arange(self.vertices), self.pinned)
-        free.setflags(write=False)
-        return free
+    @_of_mesh
+    def used(self) -> IntArray:
+        """Indices of the vertices of the elements."""
+        return _read_only(np.unique(self.elements))
 
-    @cached_property
+    @_of_mesh
+    def isolated(self) -> IntArray:
+        """Indices of the vertices in no element, and not pinned: their optimum is the target."""
+        touched = np.union1d(self.used, self.pinned)
+        return _read_only(np.setdiff1d(np.arange(self.vertices), touched))
+
+    @_of_mesh
+    def held(self) -> IntArray:
+        """Indices of the vertices that a solver leaves at their target: pinned, or isolated."""
+        return _read_only(np.concatenate([self.pinned, self.isolated]))
+
+    @_of_mesh
+    def free(self) -> IntArray:
+        """Indices of the vertices that can move: all others."""
+        return _read_only(np.setdiff1d(np.arange(self.vertices), self.held))
+
+    @_of_mesh
     def weights(self) -> FloatArray:
         """(n,) diagonal of M: the masses, or ones."""
         return _read_only(np.ones(self.vertices)) if self.mass is None else self.mass
@@ -263,20 +302,25 @@ class Problem:
         """Smallest weight of a free vertex: ||d||^2 <= ||d||_M^2 / least_weight."""
         return float(np.min(self.weights[self.free], initial=np.inf))
 
-    @cached_property
+    @_of_mesh
+    def mean_weight(self) -> float:
+        """Mean weight of the elements' vertices."""
+        return float(self.weights[self.used].mean())
+
+    @_of_mesh
     def edge_length(self) -> float:
         """Mean rest length of the elements' edges [m]: the problem's own length unit."""
         corners = rest_corners(self.rest, self.elements)
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
 
-    @cached_property
+    @_of_mesh
     def row_vertices(self) -> IntArray:
         """(rows, k) vertices of each row of G; row e m + j is element e, direction j."""
         vertices = np.repeat(self.elements, len(self.limits.directions), axis=0)
         vertices.setflags(write=False)
         return vertices
 
-    @cached_property
+    @_of_mesh
     def row_coefficients(self) -> FloatArray:
         """(rows, k) entries B_k . d of each row of G [1/m]; exact limits scale each axis by D."""
         per_element: FloatArray = np.einsum("ekc,mc->emk", self.gradients, self.limits.directions)
@@ -285,7 +329,7 @@ class Problem:
             per_element = per_element * (axes.min(axis=1, keepdims=True) / axes)[:, :, None]
         return _read_only(per_element.reshape(self.rows, -1))
 
-    @cached_property
+    @_of_mesh
     def G(self) -> sp.csr_array:  # noqa: N802
         """(rows, n) sparse: (G x)_i = F_e d, the deformed direction of constraint i."""
         k = self.elements.shape[1]
@@ -299,7 +343,7 @@ class Problem:
         G.data.setflags(write=False)
         return G
 
-    @cached_property
+    @_of_mesh
     def bounds(self) -> FloatArray:
         """(constraints,) largest stretch b_i; with exact limits that of the tightest axis."""
         bounds = self.limits.bounds
@@ -308,7 +352,7 @@ class Problem:
         shape = (len(self.elements), bounds.shape[-1])
         return _read_only(np.broadcast_to(bounds, shape).reshape(-1).copy())
 
-    @cached_property
+    @_of_mesh
     def lower_bounds(self) -> FloatArray:
         """(constraints,) least stretch; 0 without lower bounds."""
         lower = np.zeros(1) if self.limits.lower is None else self.limits.lower
@@ -361,10 +405,10 @@ class Problem:
         if len(self.pinned) < 2:
             return None
         lengths = self._reach[:, self.pinned]
-        apart = np.linalg.norm(
-            self.target[self.pinned][:, None] - self.target[self.pinned][None], axis=2
-        )
-        excess = apart - lengths * (1 + 1e-12)
+        pins = self.target[self.pinned]
+        apart: FloatArray = np.hypot.reduce(pins[:, None] - pins[None], axis=2)
+        excess = np.zeros_like(apart)
+        np.subtract(apart, lengths, out=excess, where=apart > lengths * (1 + 1e-12))
         i, j = np.unravel_index(int(np.argmax(excess)), excess.shape)
         if excess[i, j] <= 0:
             return None
@@ -378,13 +422,17 @@ class Problem:
         """An upper bound on the objective of any feasible point; infinite without pins."""
         if len(self.pinned) == 0:
             return float("inf")
-        pin = self.target[self.pinned[0]]
-        farthest = np.linalg.norm(self.target - pin, axis=1) + self._reach[0]
-        return 0.5 * float(np.sum((self.weights * farthest**2)[self.free]))
+        nearest = np.argmin(self._reach[:, self.free], axis=0)
+        pins = self.target[self.pinned[nearest]]
+        farthest = np.linalg.norm(self.target[self.free] - pins, axis=1)
+        farthest += self._reach[nearest, self.free]
+        return 0.5 * float(np.sum(self.weights[self.free] * farthest**2))
 
-    @cached_property
+    @_of_mesh
     def _reach(self) -> FloatArray:
         """(p, n) an upper bound on the distance of each vertex from each pin [m]."""
+        if len(self.pinned) == 0:
+            return _read_only(np.zeros((0, self.vertices)))
         edges, lengths = longest_edges(self)
         graph = sp.csr_array((lengths, (edges[:, 0], edges[:, 1])), shape=2 * (self.vertices,))
         reach: FloatArray = dijkstra(graph, directed=False, indices=self.pinned)
@@ -394,9 +442,9 @@ class Problem:
 def longest_edges(problem: Problem) -> tuple[IntArray, FloatArray]:
     """How long the limits let each edge become.
 
-    With e = sum_j c_j d_j over dim of the limited directions, ||F e|| <= sum_j |c_j| b_j; the
-    smallest such bound over all choices of directions and adjacent elements is kept. With exact
-    limits, ||F e|| <= ||D^-1 e||.
+    With e = sum_j c_j d_j over the limited directions, ||F e|| <= sum_j |c_j| b_j; the smallest
+    such bound over all coefficients and adjacent elements is kept. With exact limits,
+    ||F e|| <= ||D^-1 e||.
 
     Returns
     -------
@@ -405,28 +453,46 @@ def longest_edges(problem: Problem) -> tuple[IntArray, FloatArray]:
     lengths : (k,)
         Upper bound on the deformed length [m].
     """
-    dim = problem.rest.shape[-1]
-    directions = problem.limits.directions
-    bounds = np.broadcast_to(problem.limits.bounds, (len(problem.elements), len(directions)))
-    pairs = list(combinations(range(dim + 1), 2))
-    ends = problem.elements[:, pairs]
+    pairs = list(combinations(range(problem.elements.shape[1]), 2))
     corners = rest_corners(problem.rest, problem.elements)
     first, second = np.array(pairs).T
     vectors = corners[:, second] - corners[:, first]
-    longest = np.full(ends.shape[:2], np.inf)
+    bounds = np.atleast_2d(problem.limits.bounds)
     if problem.limits.spectral:
         longest = np.linalg.norm(vectors * bounds[:, None], axis=2)
-        directions = directions[:0]
-    for chosen in combinations(range(len(directions)), dim):
-        basis = directions[list(chosen)].T
-        if abs(np.linalg.det(basis)) < 1e-9:
-            continue
-        coefficients = np.abs(np.linalg.solve(basis, vectors.reshape(-1, dim).T).T)
-        length = np.einsum("epd,ed->ep", coefficients.reshape(vectors.shape), bounds[:, chosen])
-        longest = np.minimum(longest, length)
-    edges = np.sort(ends.reshape(-1, 2), axis=1)
+    else:
+        longest = np.empty(vectors.shape[:2])
+        kinds, kind = np.unique(bounds, axis=0, return_inverse=True)
+        kind = np.broadcast_to(kind.ravel(), len(vectors))
+        order = np.argsort(kind, kind="stable")
+        starts = np.searchsorted(kind[order], np.arange(1, len(kinds)))
+        for b, same in zip(kinds, np.split(order, starts), strict=True):
+            longest[same] = gauge(problem.limits.directions, b, vectors[same])
+    edges = np.sort(problem.elements[:, pairs].reshape(-1, 2), axis=1)
     unique, inverse = np.unique(edges, axis=0, return_inverse=True)
     lengths = np.full(len(unique), np.inf)
     np.minimum.at(lengths, inverse.ravel(), longest.ravel())
     limited = np.isfinite(lengths)
     return unique[limited], lengths[limited]
+
+
+def gauge(directions: FloatArray, bounds: FloatArray, vectors: FloatArray) -> FloatArray:
+    """The least sum_j |c_j| b_j with e = sum_j c_j d_j, of each vector e (..., dim).
+
+    That is the norm whose unit ball is the hull of all +-d_j / b_j: the largest a.e over its
+    facets a.p = 1. Infinite where the directions do not span the space.
+    """
+    unit = bounds.min()
+    points = directions * (unit / bounds)[:, None]
+    try:
+        facets = ConvexHull(np.concatenate([points, -points])).equations
+    except QhullError:  # the hull is flat
+        return np.full(vectors.shape[:-1], np.inf)
+    distance = -facets[:, -1] - ROUNDING  # so that no length comes out too short
+    if distance.min() < FLAT:
+        return np.full(vectors.shape[:-1], np.inf)
+    normals = (facets[:, :-1] / distance[:, None]).T
+    parts = np.array_split(vectors, 1 + vectors.size * len(facets) // 10**7)  # for memory's sake
+    lengths: FloatArray = np.concatenate([(part @ normals).max(axis=-1) for part in parts])
+    lengths *= unit
+    return lengths

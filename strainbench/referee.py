@@ -24,11 +24,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from strainbench.kkt import kkt_residual
 from strainbench.limits import FloatArray
 from strainbench.problem import Problem
-from strainbench.reference import Reference, objective_floor, reference_of
+from strainbench.reference import Reference, reference_of, relative
+from strainbench.solver import check_threads
 
 OUTCOMES = ("optimal", "feasible", "violated", "no answer")
 
@@ -81,8 +83,9 @@ def certify(
     gap: float = 1e-4,
     reference: Reference | None = None,
     best_known: float = float("inf"),
+    threads: int = 1,
 ) -> Certificate:
-    """Judge an answer to `problem`.
+    """Judge an answer to `problem`; there is a verdict on any answer to any problem.
 
     Parameters
     ----------
@@ -92,35 +95,55 @@ def certify(
         below which an answer is called a local optimum.
     reference : of this very problem, where it is known already.
     best_known : with lower bounds, the least objective known of other answers within the limits.
+    threads : of BLAS and OpenMP, for the reference.
 
     Raises
     ------
     ValueError
-        If a threshold is not positive.
+        If a threshold is not positive, or for no whole number of threads.
     """
     if not (violation > 0 and gap > 0):
         raise ValueError(f"violation is {violation} and gap {gap}: numbers above 0 are valid")
+    check_threads(threads)
     reason = _unusable(problem, positions)
     if reason:
         nan = float("nan")
         return Certificate("no answer", reason, nan, nan, nan, nan, nan, nan, nan, nan, 0)
     x = np.array(positions, dtype=np.float64)
     x[problem.pinned] = problem.target[problem.pinned]
-    ref = reference_of(problem) if reference is None else reference
-    if not problem.convex:
-        return _certify_local(problem, x, violation, gap, ref, best_known)
-    with np.errstate(over="ignore"):  # a diverged answer may be infinitely wrong
-        v: FloatArray = problem.violations(x)
-        objective = problem.objective(x)
-        apart = np.linalg.norm(x - ref.positions)
-        distance = float(np.linalg.norm(x - ref.positions, axis=1).max())
-    true_gap = max(0.0, objective + float(ref.multiplier_norms @ v) - ref.lower_bound)
-    scale = max(ref.lower_bound, objective_floor(problem))
-    relative_gap = true_gap / scale if true_gap else 0.0
-    radius = float(np.sqrt(2 * true_gap / problem.least_weight))
+    if reference is None:
+        with threadpool_limits(threads):
+            reference = reference_of(problem)
+    with np.errstate(all="ignore"):  # an answer may be infinitely wrong
+        if problem.convex:
+            return _certify_optimum(problem, x, violation, gap, reference)
+        return _certify_local(problem, x, violation, gap, reference, best_known)
+
+
+def _certify_optimum(
+    problem: Problem, x: FloatArray, violation: float, gap: float, ref: Reference
+) -> Certificate:
+    """Judge positions by the bounds of the module's docstring.
+
+    The objective of isolated vertices is a sum of its own, whose optimum is 0 at their target: how
+    far they are from there is known, and the bounds are those of the other vertices.
+    """
+    v = _violations(problem, x)
     worst = float(v.max())
-    outcome, reason = _outcome(ref, worst, relative_gap, violation, gap)
+    inside = x.copy()
+    inside[problem.isolated] = problem.target[problem.isolated]
+    astray = float(np.linalg.norm(x - inside))
+    priced = float(np.sum(ref.multiplier_norms * v, where=ref.multiplier_norms > 0))
+    true_gap = _at_least_0(problem.objective(inside) + priced - ref.lower_bound)
+    radius = float(np.sqrt(2 * true_gap / problem.least_weight))
+    apart = float(np.linalg.norm(inside - ref.positions))
     bound = float(np.fmin(apart, radius)) + ref.error
+    if worst == 0:
+        bound = min(bound, radius)
+    objective = problem.objective(x)
+    total = _at_least_0(objective + priced - ref.lower_bound)
+    relative_gap = relative(problem, total, ref.lower_bound)
+    outcome, reason = _outcome(ref, worst, relative_gap, violation, gap)
     return Certificate(
         outcome=outcome,
         reason=reason,
@@ -129,8 +152,8 @@ def certify(
         objective=objective,
         lower_bound=ref.lower_bound,
         relative_gap=relative_gap,
-        distance=distance,
-        distance_bound=min(bound, float(radius)) if worst == 0 else bound,
+        distance=float(np.linalg.norm(x - ref.positions, axis=1).max()),
+        distance_bound=float(np.hypot(bound, astray)),
         reference_error=ref.error,
         active_constraints=ref.active_constraints,
     )
@@ -145,19 +168,17 @@ def _certify_local(
     best_known: float,
 ) -> Certificate:
     """Judge positions under lower bounds: at best a local optimum."""
-    with np.errstate(over="ignore"):
-        worst = float(problem.violations(x).max())
-        objective = problem.objective(x)
+    worst = float(_violations(problem, x).max())
+    objective = problem.objective(x)
     residual = kkt_residual(problem, x) if np.isfinite(worst + objective) else float("inf")
     for y in (x, ref.positions):
-        if problem.violations(y).max() <= violation:
+        if _violations(problem, y).max() <= violation:
             best_known = min(best_known, problem.objective(y))
     outcome, nan = "feasible", float("nan")
-    excess = (objective - best_known) / max(best_known, objective_floor(problem))
+    excess = relative(problem, objective - best_known, best_known)
     if worst > violation:
-        outcome = "violated"
-        reason = ref.infeasible or f"violation {worst:.2e} above {violation:.0e}"
-    elif residual > gap:
+        outcome, reason = "violated", _violated(ref, worst, violation)
+    elif not residual <= gap:
         reason = f"no local optimum: KKT residual {residual:.2e} above {gap:.0e}"
     else:
         reason = f"at best a local optimum: KKT residual {residual:.2e}"
@@ -184,22 +205,38 @@ def _unusable(problem: Problem, positions: FloatArray) -> str | None:
     """Why an answer cannot be judged at all, or None."""
     try:
         array = np.asarray(positions)
-    except ValueError as error:
-        return f"positions that are no array: {error}"
+    except Exception as error:  # whatever a solver's own type raises
+        return f"positions that are no array: {' '.join(str(error).split())}"
     if array.shape != problem.target.shape:
         return f"positions of shape {array.shape}, not {problem.target.shape}"
-    if not np.issubdtype(array.dtype, np.number) or np.iscomplexobj(array):
+    if array.dtype.kind not in "iuf":
         return f"positions of type {array.dtype}"
+    with np.errstate(over="ignore"):
+        array = array.astype(np.float64)
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
     if len(bad):
         return f"positions of {len(bad)} vertices are not finite"
     return None
 
 
+def _violations(problem: Problem, x: FloatArray) -> FloatArray:
+    """Those of finite positions: infinite where they are too large to be computed."""
+    v = problem.violations(x)
+    return np.where(np.isnan(v), np.inf, v)
+
+
+def _at_least_0(gap: float) -> float:
+    """A gap without its rounding; one that cannot be computed is infinite."""
+    return float("inf") if np.isnan(gap) else max(0.0, gap)
+
+
 def _largest_singular_value(problem: Problem, x: FloatArray) -> float:
-    size = max(1.0, float(np.abs(x).max()))  # or the squares of a diverged answer overflow
+    size = float(np.abs(x).max()) or 1.0  # or the squares of a diverged answer overflow
     F = problem.deformation_gradients(x / size)
-    return size * float(np.sqrt(np.linalg.eigvalsh(np.swapaxes(F, 1, 2) @ F)[:, -1].max()))
+    scale = float(np.abs(F).max()) or 1.0
+    F = F / scale
+    largest = float(np.linalg.eigvalsh(np.swapaxes(F, 1, 2) @ F)[:, -1].max())
+    return size * scale * float(np.sqrt(max(0.0, largest)))
 
 
 def _outcome(
@@ -211,9 +248,18 @@ def _outcome(
 ) -> tuple[str, str]:
     """Outcome and reason from the two thresholds."""
     if worst > violation:
-        return "violated", ref.infeasible or f"violation {worst:.2e} above {violation:.0e}"
+        return "violated", _violated(ref, worst, violation)
     if relative_gap <= gap:
         return "optimal", ""
     if not np.isfinite(ref.error):
-        return "feasible", "the reference solver found no feasible point to compare with"
+        reason = "the reference solver found no feasible point to compare with"
+        return "feasible", reason if ref.failure is None else f"{reason} ({ref.failure})"
     return "feasible", f"relative gap {relative_gap:.2e} above {gap:.0e}"
+
+
+def _violated(ref: Reference, worst: float, violation: float) -> str:
+    """The reason of that outcome."""
+    reason = ref.infeasible or f"violation {worst:.2e} above {violation:.0e}"
+    if ref.failure is None or np.isfinite(ref.error):
+        return reason
+    return f"{reason}; the reference failed ({ref.failure})"

@@ -8,38 +8,41 @@ next one resumes.
 
 from __future__ import annotations
 
+import json
+import pickle
 import shutil
+import subprocess
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
-from concurrent.futures import Future
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from multiprocessing import get_context
 from pathlib import Path
-from typing import Any
-
-from pebble import ProcessPool
 
 from strainbench.cell import Cell
+from strainbench.folder import locked, uninterrupted
 from strainbench.frame import recorder
-from strainbench.isolation import Running
-from strainbench.judge import identity, judge
-from strainbench.machine import describe_machine, fixed_threads
-from strainbench.records import (
-    RUN_COLUMNS,
-    RUNS,
-    STEP_COLUMNS,
-    STEPS,
-    append_rows,
-    latest_runs,
-    open_folder,
-    read_rows,
-    remember_machine,
+from strainbench.isolation import Running, crashed
+from strainbench.judge import (
+    CASE,
+    JUDGED,
+    VERDICT,
+    Verdict,
+    identity,
+    judge_limit,
+    serve,
+    unjudged,
 )
+from strainbench.machine import describe_machine, fixed_threads
+from strainbench.play import keep_targets
+from strainbench.process import Child, Family, family
+from strainbench.records import latest_runs, mend, open_folder, remember_machine, write_cell
 from strainbench.reference import REFERENCE_SOLVER
 
 POLL_SECONDS = 0.02
+UNAVAILABLE = ("unavailable", "the worker failed")
+LAST_GRACE = 3.0  # [s] for the referee to decide the open case when a run is interrupted
 
 
 @dataclass(frozen=True)
@@ -50,14 +53,12 @@ class Settings:
     ----------
     folder : the results folder
     jobs : cells at a time
-    threads : in each solver's BLAS, OpenMP, numba and rayon
     memory_limit_mb : resident size at which a cell's process is stopped
     rerun : run finished cells again
     """
 
     folder: Path
     jobs: int = 1
-    threads: int = 1
     memory_limit_mb: float = 8192.0
     rerun: bool = False
 
@@ -76,6 +77,9 @@ class Observer:
 
     def ended(self, cell: Cell, row: dict[str, object]) -> None:
         """A cell's row was written."""
+
+    def waiting(self, what: str) -> None:
+        """Nothing goes on until this comes."""
 
 
 @dataclass
@@ -105,7 +109,7 @@ class Runner:
     Raises
     ------
     RecordsError
-        If the folder cannot be written to, or holds damaged records.
+        If the folder cannot be written to, is in use, or holds damaged records.
     """
 
     def __init__(self, settings: Settings, observer: Observer | None = None) -> None:
@@ -114,19 +118,24 @@ class Runner:
         self.summary = Summary(settings.jobs)
         folder = settings.folder
         open_folder(folder)
-        read_rows(folder / STEPS, STEP_COLUMNS)
-        self._finished = latest_runs(folder)
-        self._scratch = folder / "running"
-        self._machine = ""
+        with locked(folder):
+            self._take_stock()
+        self.scratch = folder.resolve() / "running"
+        self._machines: dict[int, str] = {}
+
+    def _take_stock(self) -> None:
+        """Mend what a dead run left, and see what has finished."""
+        mend(self.settings.folder)
+        self._finished = latest_runs(self.settings.folder)
 
     def is_finished(self, cell: Cell) -> bool:
         """Whether a row makes running `cell` needless.
 
-        It does not if the solver was unavailable or if the cell was stopped at a time limit
-        below the one given now.
+        It does not if the solver or a worker was unavailable or if the cell was stopped at a time
+        limit below the one given now.
         """
         row = self._finished.get(cell.key)
-        if row is None or self.settings.rerun or row["reason"].startswith("unavailable"):
+        if row is None or self.settings.rerun or row["reason"].startswith(UNAVAILABLE):
             return False
         if row["reason"].startswith("time limit"):
             return cell.time_limit is not None and cell.time_limit <= float(row["time_limit"])
@@ -134,35 +143,31 @@ class Runner:
 
     def run(self, cells: Sequence[Cell]) -> Summary:
         """Run what is not finished; KeyboardInterrupt passes through, with all results kept."""
+        with locked(self.settings.folder):
+            self._take_stock()
+            return self._run(cells)
+
+    def _run(self, cells: Sequence[Cell]) -> Summary:
         begin = time.perf_counter()
         wanted = [cell for cell in cells if not self.is_finished(cell)]
-        self._machine, facts = describe_machine(self.settings.threads)
-        remember_machine(self.settings.folder, self._machine, facts)
+        for threads in {cell.threads for cell in wanted}:
+            self._machines[threads], facts = describe_machine(threads)
+            remember_machine(self.settings.folder, self._machines[threads], facts)
         self.observer.planned(wanted, len(cells) - len(wanted))
-        shutil.rmtree(self._scratch, ignore_errors=True)
-        spawn = get_context("spawn")
-        with (
-            fixed_threads(self.settings.threads),
-            ProcessPool(self.settings.jobs, max_tasks=1, context=spawn) as pool,
-            ProcessPool(1, context=spawn) as referee,
-        ):
-            court = Court(self, referee)
-            try:
+        shutil.rmtree(self.scratch, ignore_errors=True)
+        with fixed_threads(1), family() as ours:  # the referee's
+            court = Court(self, ours)
+            with court.in_session():
                 missing = self._missing_recordings(wanted)
-                self._play_all(pool, missing, self._keep_recording, court)
-                self._play_all(pool, wanted, court.take, court)
-            except BaseException:
-                pool.stop()
-                raise
-            finally:
-                court.close()
-        shutil.rmtree(self._scratch, ignore_errors=True)
+                self._play_all(ours, missing, self._keep_recording, court)
+                self._play_all(ours, wanted, court.take, court)
+        shutil.rmtree(self.scratch, ignore_errors=True)
         self.summary.wall = time.perf_counter() - begin
         return self.summary
 
     def _play_all(
         self,
-        pool: ProcessPool,
+        ours: Family,
         cells: Sequence[Cell],
         take: Callable[[Running], None],
         court: Court,
@@ -179,23 +184,24 @@ class Runner:
                 if self._cannot_start(cell):
                     continue
                 self.observer.started(cell)
-                running.append(self._start(pool, cell))
+                running.append(self._start(ours, cell))
             for item in [r for r in running if r.has_ended()]:
                 running.remove(item)
                 self.summary.start += item.start_seconds()
                 self.summary.play += item.play_seconds()
                 take(item)
-            court.advance(not alone or not any(r.released for r in running))
+            court.advance(not alone or not any(r.released is not None for r in running))
             for item in running:
                 self.observer.stepped(item.cell, item.steps)
                 if item.is_ready() and (court.idle or not alone):
                     item.release()
             time.sleep(POLL_SECONDS)
 
-    def _start(self, pool: ProcessPool, cell: Cell) -> Running:
+    def _start(self, ours: Family, cell: Cell) -> Running:
         recording = self._recording(cell) if cell.mode == "replay" else None
-        folder = self._scratch / f"{cell.key}-{cell.mode}"
-        return Running.start(pool, cell, folder, recording, self.settings.memory_limit_mb)
+        folder = self.scratch / f"{cell.key}-{cell.mode}"
+        with fixed_threads(cell.threads):
+            return Running.start(ours, cell, folder, recording, self.settings.memory_limit_mb)
 
     def _cannot_start(self, cell: Cell) -> bool:
         """Whether a cell ends before it begins, as a row with the reason."""
@@ -210,19 +216,19 @@ class Runner:
         return bool(reason)
 
     def _recording(self, cell: Cell) -> Path:
-        return self.settings.folder / "recordings" / cell.recording_key
+        return self.settings.folder.resolve() / "recordings" / cell.recording_key
 
     def _missing_recordings(self, cells: Sequence[Cell]) -> list[Cell]:
         """The cells that record what replay cells will be fed, where that is not there yet."""
-        missing = {
-            cell.recording_key: recorder(cell)
-            for cell in cells
-            if cell.mode == "replay" and not self._recording(cell).exists()
-        }
-        return list(missing.values())
+        fed = {cell.recording_key: cell for cell in cells if cell.mode == "replay"}
+        there = {key for key, cell in fed.items() if self._recording(cell).exists()}
+        for key in there:
+            keep_targets(self._recording(fed[key]))  # of an earlier version, with answers
+        return [recorder(cell) for key, cell in fed.items() if key not in there]
 
     def _keep_recording(self, item: Running) -> None:
         if item.steps == item.cell.steps:
+            keep_targets(item.folder)
             target = self._recording(item.cell)
             target.parent.mkdir(exist_ok=True)
             item.folder.rename(target)
@@ -230,25 +236,63 @@ class Runner:
     def write(self, cell: Cell, row: dict[str, object], steps: Sequence[dict[str, object]]) -> None:
         """Append a cell's rows and tell the observer."""
         row["finished_at"] = datetime.now(UTC).isoformat(timespec="seconds")
-        row["machine"] = self._machine
-        append_rows(self.settings.folder / STEPS, STEP_COLUMNS, steps)
-        append_rows(self.settings.folder / RUNS, RUN_COLUMNS, [row])
+        row["machine"] = self._machines.get(cell.threads, "")
+        write_cell(self.settings.folder, row, steps)
         self.summary.cells += 1
         self.observer.ended(cell, row)
 
 
-class Court:
-    """The referee's process and the cases before it, one at a time."""
+@dataclass
+class Case:
+    """What is before the referee."""
 
-    def __init__(self, runner: Runner, pool: ProcessPool) -> None:
-        self._runner, self._pool = runner, pool
+    item: Running
+    judged: int = 0
+    since: float = field(default_factory=time.monotonic)
+
+    def failure(self, referee: Child) -> str:
+        """Why the referee will not decide it, or ""."""
+        if (code := referee.exit_code) is not None:
+            return crashed(code).removeprefix("crashed: ")
+        path = self.item.folder / JUDGED
+        judged = path.stat().st_size if path.exists() else 0
+        if judged != self.judged:
+            self.judged, self.since = judged, time.monotonic()
+        limit = judge_limit(self.item.events)
+        if time.monotonic() - self.since > limit:
+            return f"hung on projection {judged + 1}, beyond its limit of {limit:g} s for one"
+        return ""
+
+
+class Court:
+    """The referee's process and the cases before it, one at a time.
+
+    A process that has failed on one case is not asked again: the next case has a fresh one.
+    """
+
+    def __init__(self, runner: Runner, ours: Family) -> None:
+        self._runner, self._family = runner, ours
         self._waiting: deque[Running] = deque()
-        self._open: tuple[Running, Future[Any]] | None = None
+        self._open: Case | None = None
+        self._referee: Child | None = None
 
     @property
     def idle(self) -> bool:
         """Whether no case is left."""
         return not self._waiting and self._open is None
+
+    @contextmanager
+    def in_session(self) -> Iterator[None]:
+        """Decide what is left at the end; after an interrupt what is open, if that is soon done."""
+        ended = False
+        try:
+            yield
+            ended = True
+        finally:
+            until = time.monotonic() + (float("inf") if ended else LAST_GRACE)
+            while time.monotonic() < until and (self._open or (ended and self._waiting)):
+                self.advance(ended)
+                time.sleep(POLL_SECONDS)
 
     def take(self, item: Running) -> None:
         """A cell that has ended becomes a case."""
@@ -256,25 +300,49 @@ class Court:
 
     def advance(self, may_open: bool) -> None:
         """Write down the open case if it is decided; open the next one if that is allowed."""
-        if self._open and self._open[1].done():
-            self._settle(*self._open)
-            self._open = None
+        if self._open and (verdict := self._verdict(self._open)):
+            with uninterrupted():  # a case is settled once
+                item, self._open = self._open.item, None
+                self._settle(item, *verdict)
         if self._waiting and self._open is None and may_open:
-            item = self._waiting.popleft()
-            folder = self._runner.settings.folder
-            cache = folder / "references" if item.cell.mode == "replay" else None
-            case = self._pool.schedule(judge, args=(item.cell, item.folder, item.ending, cache))
-            self._open = item, case
+            self._open = Case(self._waiting.popleft())
+            self._hand_over(self._open.item)
 
-    def close(self) -> None:
-        """Decide what is left."""
-        while not self.idle:
-            self.advance(True)
-            time.sleep(POLL_SECONDS)
+    def _hand_over(self, item: Running) -> None:
+        """Give a case to the referee's process, which is started if there is none."""
+        item.folder.mkdir(exist_ok=True)  # a plug-in may have removed it
+        if self._referee is None or self._referee.exit_code is not None:
+            folder = self._runner.scratch / f"referee-{len(self._family.children)}"
+            folder.mkdir(parents=True)
+            self._referee = self._family.start(serve, (), folder, subprocess.PIPE)
+        try:
+            (item.folder / CASE).write_bytes(pickle.dumps((item.cell, item.ending)))
+            stdin = self._referee.process.stdin
+            assert stdin is not None
+            stdin.write(json.dumps(str(item.folder)).encode() + b"\n")
+            stdin.flush()
+        except OSError:
+            self._referee.stop()  # which decides the case: see `Case.failure`
 
-    def _settle(self, item: Running, case: Future[Any]) -> None:
-        row, steps = case.result()
+    def _verdict(self, case: Case) -> Verdict | None:
+        """The rows of a case, or None while it is open."""
+        assert self._referee is not None
+        item, failure = case.item, case.failure(self._referee)
+        if (item.folder / VERDICT).exists():  # after the look at the process: none comes after
+            found = json.loads((item.folder / VERDICT).read_text(encoding="utf-8"))
+            if not isinstance(found, str):
+                return found[0], found[1]
+            failure = found
+        if not failure:
+            return None
+        if not (item.folder / VERDICT).exists():
+            self._referee.stop()
+        return unjudged(item.cell, item.folder, item.ending, failure)
+
+    def _settle(
+        self, item: Running, row: dict[str, object], steps: list[dict[str, object]]
+    ) -> None:
         row["start_seconds"] = item.start_seconds()
-        self._runner.summary.judging += float(row["judge_seconds"])
+        self._runner.summary.judging += float(str(row.get("judge_seconds", 0.0)))
         self._runner.write(item.cell, row, steps)
         shutil.rmtree(item.folder, ignore_errors=True)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from math import ceil
 from time import perf_counter
 from typing import ClassVar
 
 import numpy as np
 
+from strainbench.fields import same, spelled
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import lumped_areas
 from strainbench.physics.cloth import Cloth, Material
@@ -24,6 +26,7 @@ from strainbench.physics.integrators import INTEGRATORS, Motion
 from strainbench.problem import IntArray, Problem
 
 EASY_LIMIT = 0.01  # tighter ones are checked on this one
+FEWEST_STEPS = 10  # of a run that is not told how many
 
 
 @dataclass(frozen=True)
@@ -64,7 +67,8 @@ class Scenario(ABC):
     """A scene: a frozen dataclass whose fields can be set from the command line.
 
     The first line of the docstring reads "scene (paper)". `needs` names the physics that the
-    scene cannot do without; what it does not need is not built.
+    scene cannot do without; what it does not need is not built. `about` names what the scene waits
+    for, if it waits for anything: a run in which that has not happened says so.
 
     Parameters
     ----------
@@ -76,6 +80,7 @@ class Scenario(ABC):
 
     name: ClassVar[str]
     needs: ClassVar[frozenset[str]]
+    about: ClassVar[str] = ""
 
     resolution: int = 20
     limit: float = 0.01
@@ -109,6 +114,20 @@ class Scenario(ABC):
         return replace(self, limit=EASY_LIMIT) if self.limit < EASY_LIMIT else None
 
     @property
+    def first_step(self) -> float:
+        """The step in which what the scene is about begins, as far as that is known."""
+        return 1
+
+    @property
+    def usual_steps(self) -> int:
+        """Time steps of a run that is not told how many: enough for what the scene is about."""
+        return FEWEST_STEPS
+
+    def has_begun(self, candidate: FloatArray) -> bool:  # noqa: ARG002
+        """Whether what the scene is about happens where `candidate` (n, 3) is to be projected."""
+        return True
+
+    @property
     def parameters(self) -> dict[str, object]:
         """The fields and their values."""
         return {f.name: getattr(self, f.name) for f in fields(self)}
@@ -122,14 +141,17 @@ class Scenario(ABC):
     @property
     def label(self) -> str:
         """Name, resolution and limit, then what else differs from the defaults."""
-        shown = {"resolution", "limit"}
-        changed = {
-            f.name: getattr(self, f.name)
-            for f in fields(self)
-            if f.name not in shown and getattr(self, f.name) != f.default
-        }
-        others = "".join(f", {k}={v}" for k, v in changed.items())
-        return f"{self.name} {self.resolution} at {100 * self.limit:g}%{others}"
+        return self.labelled({})
+
+    def labelled(self, words: Mapping[str, str]) -> str:
+        """The same; what was set in `words` is there as it was spelled, defaults too."""
+        default = type(self)().parameters
+        others = "".join(
+            f", {k}={words.get(k) or spelled(v)}"
+            for k, v in self.parameters.items()
+            if k not in ("resolution", "limit") and (k in words or not same(v, default[k]))
+        )
+        return f"{self.name} {self.resolution} at {100 * self.limit:.12g}%{others}"
 
     def limits(self) -> StretchLimits:
         """The same bound in all directions."""
@@ -185,14 +207,20 @@ class ClothScenario(SheetScenario):
     """A sheet of cloth, stepped by one of the paper's schemes.
 
     Gravity, membrane and bending are built where they are in `needs`; without "inertia" each step
-    starts at rest.
+    starts at rest. `begins` is when what the scene is about begins, and `lasts` how long a run
+    shows it, both in seconds of its time.
 
     Parameters
     ----------
-    integrator : a key of `strainbench.physics.integrators.INTEGRATORS`.
+    integrator : sap, sar, bap or bar as in the paper, or sar-projected, bar-bdf2 or bar-stable,
+        our variants of them: `strainbench.physics.integrators`.
     step : time step [s].
     norm : "unweighted" as printed in Eq. 5, or "mass".
     """
+
+    about: ClassVar[str] = "contact"
+    begins: ClassVar[float] = 0.0
+    lasts: ClassVar[float] = 0.0
 
     norm: str = "unweighted"
     integrator: str = "sap"
@@ -205,6 +233,21 @@ class ClothScenario(SheetScenario):
             raise ValueError(f"integrator is {self.integrator!r}: valid are {valid}")
         if not 0 < self.step < float("inf"):
             raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
+
+    @property
+    def first_step(self) -> float:
+        """See the base class."""
+        return max(1, ceil(self.begins / self.step))
+
+    @property
+    def usual_steps(self) -> int:
+        """See the base class."""
+        return max(FEWEST_STEPS, ceil(self.lasts / self.step))
+
+    def has_begun(self, candidate: FloatArray) -> bool:
+        """See the base class: a vertex is in the margin of an obstacle, if there are any."""
+        contact = self.contact()
+        return contact is None or contact.touches(candidate)
 
     def material(self) -> Material:
         """The constants of Tang et al. 2022, section 5; without the energies not needed."""

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from strainbench.fields import same, spelled
 from strainbench.limits import FloatArray, StretchLimits
 from strainbench.mesh import square_grid
 from strainbench.problem import Problem
@@ -45,19 +46,24 @@ class Solution:
 
 
 class Clock:
-    """Solve time, which stands still while a monitor looks at an iterate."""
+    """Solve time, which stands still while a monitor looks at an iterate.
+
+    Attributes
+    ----------
+    paused : seconds that monitors took
+    """
 
     def __init__(self, time_limit: float | None = None, watch: Watch | None = None) -> None:
         self._limit = float("inf") if time_limit is None else time_limit
         self._watch = watch
         self._iterations = 0
-        self._paused = 0.0
+        self.paused = 0.0
         self._start = perf_counter()
 
     @property
     def elapsed(self) -> float:
         """Seconds on the clock."""
-        return perf_counter() - self._start - self._paused
+        return perf_counter() - self._start - self.paused
 
     @property
     def remaining(self) -> float:
@@ -85,9 +91,9 @@ class Clock:
             return
         start = perf_counter()
         self._iterations = self._iterations + 1 if iterations is None else iterations
-        seconds = start - self._start - self._paused
+        seconds = start - self._start - self.paused
         self._watch(seconds, self._iterations, positions, multipliers)
-        self._paused += perf_counter() - start
+        self.paused += perf_counter() - start
 
 
 @dataclass(frozen=True)
@@ -161,18 +167,25 @@ class Solver(ABC):
         if self.starts_warm:
             return replace(self, warm=False).label + "-warm"  # type: ignore[call-arg]
         default = type(self)().parameters
-        changed = {k: v for k, v in self.parameters.items() if v != default[k]}
+        changed = {k: v for k, v in self.parameters.items() if not same(v, default[k])}
         if not changed:
             return self.name
         for variant, settings in self.variants.items():
-            if changed == {k: v for k, v in settings.items() if v != default[k]}:
+            if same(changed, {k: v for k, v in settings.items() if not same(v, default[k])}):
                 return f"{self.name}-{variant}"
-        return self.name + "[" + ",".join(f"{k}={v}" for k, v in changed.items()) + "]"
+        return self.name + "[" + ",".join(f"{k}={spelled(v)}" for k, v in changed.items()) + "]"
 
 
 def warm_twin(solver: Solver) -> Solver:
     """The same, starting from the frame before."""
     return replace(solver, warm=True)  # type: ignore[call-arg]
+
+
+def check_threads(threads: int) -> None:
+    """ValueError for anything but a number of threads."""
+    whole = isinstance(threads, (int, np.integer)) and not isinstance(threads, bool)
+    if not whole or threads < 1:
+        raise ValueError(f"threads is {threads!r}: a whole number of at least 1 is valid")
 
 
 def run_solver(
@@ -182,8 +195,11 @@ def run_solver(
     tolerance: float,
     time_limit: float | None = None,
     watch: Watch | None = None,
+    now: Callable[[], float] = perf_counter,
 ) -> Solution:
     """One timed projection with a prepared solver.
+
+    `now` is bound here, out of the way of a plug-in that replaces this module's clock.
 
     Raises
     ------
@@ -191,13 +207,28 @@ def run_solver(
         If the solver returns anything but a Solution.
     """
     clock = Clock(time_limit, watch)
-    solution = solver.solve(
-        problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
-    )
-    seconds = clock.elapsed
+    begin = now()
+    try:
+        solution = solver.solve(
+            problem, state, tolerance=tolerance, monitor=clock.monitor, deadline=clock
+        )
+    except BaseException as error:
+        if type(error).__name__ != "PanicException":  # of pyo3, which shows no class to import
+            raise
+        words = " ".join(str(error).split())
+        solution = Solution(np.full_like(problem.target, np.nan), f"panic: {words}", 0)
+    seconds = now() - begin - (clock.paused if watch else 0.0)
     if not isinstance(solution, Solution):
         raise TypeError(f"{solver.name} returned {type(solution).__name__}, not a Solution")
-    return replace(solution, seconds=seconds)
+    s = solution  # perhaps of a class with a mind of its own
+    return Solution(s.positions, s.status, s.iterations, s.multipliers, s.details, seconds)
+
+
+def held_still(problem: Problem, tolerance: float) -> Solution:
+    """The answer where no vertex is free: the target, if it is within the limits."""
+    within = problem.violations(problem.target).max() <= tolerance
+    status = "solved" if within else "infeasible"
+    return Solution(problem.target.copy(), status, 0, np.zeros((problem.rows, 3)))
 
 
 def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:

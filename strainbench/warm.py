@@ -40,7 +40,7 @@ class Memory(Generic[Mesh]):
             return problem.target.copy(), np.zeros((problem.rows, 3))
         target, positions, multipliers = self._last
         x = positions + (problem.target - target)
-        x[problem.pinned] = problem.target[problem.pinned]
+        x[problem.held] = problem.target[problem.held]
         return x, multipliers.copy()
 
     def keep(self, problem: Problem, solution: Solution) -> Solution:

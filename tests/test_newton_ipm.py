@@ -281,7 +281,7 @@ def test_a_warm_start_gives_the_same_answers(kind):
 
 
 def iterate_of(problem, steps):
-    iterate = Iterate(problem, State(problem), keep=False)
+    iterate = Iterate(problem, State(problem), False, TOLERANCE)
     iterate.start()
     for _ in range(steps):
         iterate.measure()

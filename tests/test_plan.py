@@ -183,8 +183,8 @@ def test_all_is_every_solver_of_ours_once():
 def test_a_solver_from_a_file_runs_beside_ours(mine):
     found = cells(solvers=[str(mine), "none"], settings=["mine.sweeps=3,5", "mine.exact=true"])
     assert [c.solver.label for c in found] == [
-        "mine[exact=True]",
-        "mine[sweeps=5,exact=True]",
+        "mine[sweeps=3,exact=true]",
+        "mine[sweeps=5,exact=true]",
         "none",
     ]
     assert found[0].solver.path == str(mine)

@@ -7,7 +7,7 @@ import json
 import pytest
 
 from strainbench.judge import identity
-from strainbench.machine import PACKAGES, installed
+from strainbench.machine import PACKAGES, describe_machine, installed
 from strainbench.plan import plan
 from strainbench.records import RUN_COLUMNS, RUNS, append_rows, remember_machine
 from strainbench.report.versions import UNKNOWN, said_of_older, shown_runs
@@ -48,7 +48,7 @@ def shown(folder):
 
 
 def test_what_is_installed_is_shown_and_nothing_is_said(tmp_path, mine):
-    remember_machine(tmp_path, "m", {"packages": installed(PACKAGES)})
+    remember_machine(tmp_path, "m", describe_machine(1)[1])
     measure(tmp_path, mine, "none", seconds=1)
     assert shown(tmp_path) == [("mine", "1", ""), ("none", "1", "")]
     assert said_of_older(shown_runs(tmp_path)) == []
@@ -101,7 +101,8 @@ def test_rows_of_another_suite_or_of_before_sources_were_kept_are_older(tmp_path
 
 
 def test_packages_that_have_changed_are_named(tmp_path):
-    remember_machine(tmp_path, "m", {"packages": installed(PACKAGES) | {"numpy": "1.0"}})
+    facts = describe_machine(1)[1]
+    remember_machine(tmp_path, "m", facts | {"packages": installed(PACKAGES) | {"numpy": "1.0"}})
     measure(tmp_path, "none", seconds=1)
     ((_, _, older),) = shown(tmp_path)
     assert older == f"with numpy 1.0 (now {installed(['numpy'])['numpy']})"

@@ -48,7 +48,8 @@ class Rows:
         self._mass = np.zeros(len(found))
         self._mass[index[len(i) :]] = problem.weights[problem.free]
         starts = np.searchsorted(found, n * np.arange(n + 1))
-        self.linear = SuperLU(sp.csc_array((self._mass, found % max(n, 1), starts)))
+        if n:
+            self.linear = SuperLU(sp.csc_array((self._mass, found % n, starts)))
 
     def factorise(self, weights: FloatArray) -> None:
         """Take M + G^T W G with these weights (rows,)."""

@@ -213,7 +213,7 @@ def fill_congruent(R, A, out):  # type: ignore[no-untyped-def]
         out[e, 2] = p * r * a + (p * s + q * r) * b + q * s * d
 
 
-@compiled
+@compiled(error_model="numpy")
 def fill_push(inverse, d, c, r, y, scaled, h, Y):  # type: ignore[no-untyped-def]
     """scaled = R^-1 r R^-T, h = c/((d_p + d_q)/2) - scaled, and Y = R^-T h R^-1 y."""
     fill_congruent(inverse, r, scaled)

@@ -6,6 +6,7 @@ import numpy as np
 
 from solvers.newton_ipm.exact import ExactCones
 from solvers.newton_ipm.mesh import Change
+from solvers.newton_ipm.sampled import ROUNDING as LOST
 from solvers.newton_ipm.sampled import SampledCones
 from strainbench import Problem
 from strainbench.limits import FloatArray
@@ -17,12 +18,14 @@ FLOOR = 3e-3  # least first slack, in b^2
 FIRST_MU = 50.0  # times the guess of the optimum's objective
 EXPONENT = 6  # of sigma
 LEAST_SIGMA = 1e-4
+AIM = 0.1  # part of the tolerance
 CORRECTORS = 2
 LONGER, GROWTH = 0.3, 0.1  # a corrector aims at this longer a step, and must bring this part of it
 LOW, HIGH = 0.1, 5.0  # products aimed at by correctors, in sigma mu
 BACK_OFF = 0.99
 SNAPSHOT = 0.1  # relative gap
 STRICTER = 100.0  # limits must hold so much better than the gap: they do, but for the last steps
+LARGE = 1e3  # multipliers, of the objective: there may be others that are larger still
 ROUNDING = 32 * np.finfo(float).eps  # of a sum of products, as the referee counts it
 
 
@@ -30,7 +33,7 @@ class State:
     """What a mesh needs once, and the last frame's centred iterate."""
 
     def __init__(self, problem: Problem) -> None:
-        self.pattern = Pattern.of([problem.elements], problem.vertices, problem.pinned)
+        self.pattern = Pattern.of([problem.elements], problem.vertices, problem.held)
         self.linear = best_linear_solver(self.pattern.matrix())
         kind = ExactCones if problem.limits.spectral else SampledCones
         self.cones: SampledCones | ExactCones = kind(problem, self.pattern)
@@ -56,7 +59,8 @@ class Iterate:
     infeasible : whether the dual bound shows that no positions meet the limits
     """
 
-    def __init__(self, problem: Problem, state: State, keep: bool) -> None:
+    def __init__(self, problem: Problem, state: State, keep: bool, tolerance: float) -> None:
+        self.tolerance = tolerance
         self.problem, self.state, self.cones = problem, state, state.cones
         self.keep = keep
         self.target, self.weights = problem.target, problem.weights[:, None]
@@ -69,7 +73,7 @@ class Iterate:
     def start(self) -> None:
         """From the target, with products of a guess: the violation over the size of the mesh."""
         problem = self.problem
-        size = problem.edge_length * np.sqrt(problem.vertices)
+        size = problem.edge_length * np.sqrt(len(problem.used))
         far = size * np.sqrt(np.mean(self.violations**2))
         guess = 0.5 * far**2 * float(np.sum(problem.weights[self.free]))
         self.x = self.target
@@ -81,26 +85,32 @@ class Iterate:
         assert self.state.snapshot is not None
         x, s, l, target = self.state.snapshot  # noqa: E741
         self.x = x + (self.target - target)
+        self.x[self.problem.held] = self.target[self.problem.held]
         self.cones.place(self.problem.bounds, self.x)
         self.cones.resume(s, l)
 
     def measure(self) -> float:
-        """The larger of violation and relative gap at x, the violations priced in."""
+        """The larger of relative gap at x, the violations priced in, and STRICTER violations."""
         cones, free = self.cones, self.free
         self.Y, norms = cones.multipliers()
         pull = cones.back(self.Y)
         self.r_d = self.weights * (self.x - self.target) + pull
         excess = cones.excess()
-        objective = self.problem.objective(self.x)
+        self.objective = objective = self.problem.objective(self.x)
         most = float(cones.b @ norms)
         linear = float(np.sum(self.Y * self.y_target)) - most * (1 + ROUNDING)
         square = float(np.sum(pull[free] ** 2 / self.weights[free]))
         bound = 0.5 * linear**2 / square if linear > 0 < square else 0.0
         self.infeasible = bound > objective and bound > self.problem.largest_objective
-        priced = objective - bound + float(norms @ np.maximum(excess, 0.0))
-        self.gap = max(0.0, priced) / max(bound, self.floor)
+        price, scale = float(norms @ np.maximum(excess, 0.0)), max(bound, self.floor)
+        self.priced = objective - bound + price
+        self.gap = max(0.0, self.priced) / scale
         self.violation = float(np.max(excess))
-        return max(STRICTER * self.violation, self.gap)
+        error = max(STRICTER * self.violation, self.gap)
+        if most < LARGE * scale:
+            return error
+        beyond = np.maximum(excess - 2 * LOST, 0.0)
+        return max(error, STRICTER * float(norms @ beyond) / scale)
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
@@ -115,7 +125,9 @@ class Iterate:
             self._snapshot(*self._direction(cones.corrector(mu), r))
         _, affine = self._direction(cones.predictor(), r)
         ratio = cones.products(affine, affine.length) / total
-        mu *= max(ratio**EXPONENT, LEAST_SIGMA)
+        enough = AIM * self.tolerance * max(self.objective, self.floor)
+        least = min(total, max(enough, LEAST_SIGMA * self.priced)) / cones.degree
+        mu = max(mu * max(ratio**EXPONENT, LEAST_SIGMA), least)
         r = r - affine.square
         c = cones.corrector(mu, affine)  # 4
         dx, change = self._direction(c, r)

@@ -157,7 +157,7 @@ def add_back(elements, gradients, corners, axes, d, Y, out):  # type: ignore[no-
         spread(elements, gradients, corners, axes, e, P, out)
 
 
-@compiled
+@compiled(error_model="numpy")
 def add_push(elements, gradients, corners, axes, d, c, r, s, l, y, h, out):  # type: ignore[no-untyped-def] # noqa: E741
     """h = (c - l r)/s, and G^T (h y) added to `out` (n, 3)."""
     m = len(d)
@@ -199,7 +199,7 @@ def add_hessian(elements, gradients, corners, axes, d, l, z, y, slots, stride, d
         spread_symmetric(elements, gradients, corners, axes, e, H, slots, stride, data)
 
 
-@compiled
+@compiled(error_model="numpy")
 def fill_change(elements, gradients, corners, axes, d, dx, y, s, l, z, r, h, ds, dl, square):  # type: ignore[no-untyped-def] # noqa: E741
     """ds = r - y.dy, dl = h + z y.dy, square = |dy|^2/2; the step's length is returned."""
     m = len(d)

@@ -99,6 +99,10 @@ class Contact:
             blocks += touching[:, None, None] * normals[:, :, None] * normals[:, None, :]
         return blocks
 
+    def touches(self, x: FloatArray) -> bool:
+        """Whether a vertex lies within the margin of an obstacle, or inside one."""
+        return any(bool(np.any(o.distances(x)[0] < self.margin)) for o in self.obstacles)
+
     def penetration(self, x: FloatArray) -> float:
         """How deep the deepest vertex lies inside an obstacle [m]; 0 if none does."""
         return max(float(np.max(-o.distances(x)[0], initial=0.0)) for o in self.obstacles)

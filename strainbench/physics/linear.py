@@ -32,6 +32,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
+from threadpoolctl import ThreadpoolController, threadpool_info
 
 from strainbench.limits import FloatArray
 
@@ -201,9 +202,14 @@ class Pardiso(LinearSolver):
 
 @cache
 def _mkl() -> Any:
-    """MKL, found once: pypardiso searches the whole environment for it."""
+    """MKL, found once: pypardiso searches the whole environment for it.
+
+    It takes as many threads as BLAS has by now: a limit set before holds for it too.
+    """
+    threads = min(pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas")
     library = importlib.import_module("pypardiso").PyPardisoSolver().libmkl
     library.pardiso.argtypes = None
+    ThreadpoolController().select(internal_api="mkl").limit(limits=threads)
     return library
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from shutil import which
 from tempfile import TemporaryDirectory
 
 import numpy as np
 from PIL import Image
 
+from strainbench.options import shown
 from strainbench.plan import plan_one
 from strainbench.records import open_folder
 from strainbench.render.animation import write_gif, write_mp4
@@ -29,7 +31,11 @@ def parse_formats(text: str) -> list[str]:
     formats = list(dict.fromkeys(text.split(",")))
     for word in formats:
         if word not in FORMATS:
-            raise ValueError(f"--format {word}: valid are {', '.join(FORMATS)}, with commas")
+            valid = f"valid are {', '.join(FORMATS)}, with commas"
+            raise ValueError(f"--format {shown(word)}: {valid}")
+    if formats == ["mp4"] and not which("ffmpeg"):
+        others = ", ".join(f for f in FORMATS if f != "mp4")
+        raise ValueError(f"--format mp4: it needs ffmpeg, not on the path; valid are {others}")
     return formats
 
 
@@ -40,7 +46,10 @@ def parse_scale(text: str) -> float:
     except ValueError:
         top = float("nan")
     if not 0 < top < float("inf"):
-        raise ValueError(f"--scale {text}: a strain above 0 is valid, such as 5% or 0.05")
+        raise ValueError(f"--scale {shown(text)}: a strain above 0 is valid, such as 5% or 0.05")
+    if top >= 1 and not text.endswith("%"):
+        meant = f"{text}% is valid, or {100 * top:g}% if it is meant"
+        raise ValueError(f"--scale {text}: that is a strain of {100 * top:g}%; {meant}")
     return top
 
 
@@ -51,7 +60,9 @@ def parse_camera(text: str) -> Camera:
     except ValueError:
         azimuth = elevation = float("nan")
     if not (np.isfinite(azimuth) and abs(elevation) <= 90):
-        raise ValueError(f"--camera {text}: AZIMUTH,ELEVATION in degrees is valid, such as 30,32")
+        raise ValueError(
+            f"--camera {shown(text)}: AZIMUTH,ELEVATION in degrees is valid, such as 30,32"
+        )
     return Camera(azimuth, elevation)
 
 

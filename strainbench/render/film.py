@@ -81,7 +81,7 @@ def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
     scenario, solver = cell.scenario.scenario(), cell.solver.solver()
     problem = scenario.problem()
     if refusal := solver.supports(problem):
-        raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
+        raise ValueError(f"{cell.solver.label} cannot take this scene: {refusal}")
     step: float | None = getattr(scenario, "step", None)  # a scene without inertia has no clock
     stage = _Stage(problem, solver, cell.tolerance)
     frames = [Frame(0, None if step is None else 0.0, problem.target)]
@@ -92,7 +92,7 @@ def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
             next(steps)
         except Exception as error:  # a failing solver is data here too: what was played is shown
             reason = str(error) if isinstance(error, _Cut) else f"{type(error).__name__}: {error}"
-            stopped = f"{solver.label} ended in step {k} of {cell.steps}: {reason}"
+            stopped = f"{cell.solver.label} ended in step {k} of {cell.steps}: {reason}"
             break
         if k % every == 0 or k == cell.steps:
             frames.append(Frame(k, None if step is None else k * step, stage.positions))
@@ -101,7 +101,7 @@ def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
     interval = None if step is None else every * step
     contact = scenario.contact() if isinstance(scenario, ClothScenario) else None
     obstacles = contact.obstacles if contact else ()
-    return Film(scene, solver.label, problem, frames, interval, stopped, obstacles)
+    return Film(scene, cell.solver.label, problem, frames, interval, stopped, obstacles)
 
 
 class _Cut(Exception):  # noqa: N818

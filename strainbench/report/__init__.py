@@ -6,31 +6,14 @@ from pathlib import Path
 
 import pandas as pd
 
-from strainbench.records import RecordsError, latest_runs, read_machines
+from strainbench import escape
+from strainbench.records import WORDS, RecordsError, latest_runs, read_machines
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_markdown
 from strainbench.report.failures import failures, failures_markdown
 from strainbench.report.page import write_page
 from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_markdown
 from strainbench.report.table import as_latex, as_markdown, describe, tidy
-
-WORDS = {
-    *(
-        "cell",
-        "finished_at",
-        "scenario",
-        "directions",  # a number, or exact
-        "integrator",
-        "solver",
-        "mode",
-        "outcome",
-        "reason",
-        "details_mean",
-        "needs",
-    ),
-    *("scenario_parameters", "solver_parameters", "machine"),
-}
-"""Columns of runs.csv that are not numbers."""
 
 
 def load_runs(folder: Path) -> pd.DataFrame:
@@ -57,7 +40,7 @@ def write_report(folder: Path) -> list[Path]:
     runs = load_runs(folder)
     machines = read_machines(folder)
     paths = {n: folder / n for n in ("table1.csv", "table1.md", "table1.tex", "index.html")}
-    tidy(runs).to_csv(paths["table1.csv"], index=False)
+    tidy(runs).map(escape.cell).to_csv(paths["table1.csv"], index=False)
     markdown = as_markdown(runs, machines)
     paths["table1.md"].write_text(markdown)
     if swept := sweep_markdown(runs):
@@ -66,7 +49,7 @@ def write_report(folder: Path) -> list[Path]:
     failed = failures(folder, runs)
     if len(failed):
         paths |= {n: folder / n for n in ("failures.csv", "failures.md")}
-        failed.to_csv(paths["failures.csv"], index=False)
+        failed.map(escape.cell).to_csv(paths["failures.csv"], index=False)
         paths["failures.md"].write_text(failures_markdown(failed, runs, machines))
     if table := energy_markdown(folder, runs):
         paths["energy.md"] = folder / "energy.md"

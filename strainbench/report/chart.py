@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from strainbench import escape
 from strainbench.report.table import groups
 
 COLOURS = ("#0072B2", "#E69F00", "#009E73", "#D55E00", "#CC79A7", "#56B4E9", "#000000", "#999933")
@@ -61,7 +62,7 @@ def speed_accuracy(runs: pd.DataFrame, stem: Path) -> list[Path]:
     for ax in axes[-1]:
         ax.set_xlabel("seconds a projection")
     room = int(13 * (width - 2 * LEGEND_INCHES))  # in characters, beside the legend if centred
-    figure.suptitle("\n".join(wrap(group.title, max(room, 40))), size=11)
+    figure.suptitle("\n".join(map(escape.chart, wrap(group.title, max(room, 40)))), size=11)
     figure.legend(handles=_legend(style), loc="outside right upper", frameon=False, fontsize=9)
     return save(figure, stem)
 
@@ -104,7 +105,8 @@ def _panel(ax: Axes, rows: pd.DataFrame, style: dict[str, dict[str, Any]], top: 
 
 def _legend(style: dict[str, dict[str, Any]]) -> list[Line2D]:
     handles = [
-        Line2D([], [], linestyle="none", markersize=8, label=name, **s) for name, s in style.items()
+        Line2D([], [], linestyle="none", markersize=8, label=escape.chart(name), **s)
+        for name, s in style.items()
     ]
     for label, fill in (("within the limits", "full"), ("violates them", "none")):
         handles.append(

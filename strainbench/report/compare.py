@@ -13,6 +13,7 @@ import numpy as np
 from rich import box
 from rich.table import Table
 
+from strainbench import escape
 from strainbench.records import RecordsError, Row, latest_runs, open_folder
 from strainbench.report.pair import SAME, Pair
 
@@ -89,21 +90,24 @@ class Comparison:
     def tables(self) -> Iterator[Table]:
         """For the terminal."""
         for title, lines in self.groups():
-            table = Table(title=title, title_justify="left", box=box.MARKDOWN)
+            table = Table(title=escape.terminal(title), title_justify="left", box=box.MARKDOWN)
             for name in HEADER:
                 table.add_column(name, no_wrap=name == "method", overflow="fold")
             for line in lines:
-                table.add_row(*line)
+                table.add_row(*map(escape.terminal, line))
             yield table
 
     def markdown(self) -> str:
         """All of it."""
-        parts = ["# Two results folders, cell by cell", *self.head()]
+        parts = ["# Two results folders, cell by cell", *map(escape.markdown, self.head())]
         for title, lines in self.groups():
-            rows = [HEADER, ("---",) * len(HEADER), *lines]
-            parts += [f"## {title}", "\n".join(f"| {' | '.join(row)} |" for row in rows)]
+            rows = [HEADER, ("---",) * len(HEADER), *(map(escape.markdown, line) for line in lines)]
+            parts += [
+                f"## {escape.markdown(title)}",
+                "\n".join(f"| {' | '.join(row)} |" for row in rows),
+            ]
         if notes := self.foot():
-            parts.append("\n".join(f"- {note}" for note in notes))
+            parts.append("\n".join(f"- {escape.markdown(note)}" for note in notes))
         return "\n\n".join(parts) + "\n"
 
     def csv(self) -> str:
@@ -117,7 +121,8 @@ class Comparison:
                 line |= {f"{name}_{side}": row[name] if row else "" for name in MEASURES}
             line["seconds_ratio"] = pair.ratio if pair.ratio > 0 else ""
             line["only_in"] = "" if pair.a and pair.b else "a" if pair.a else "b"
-            writer.writerow(line | {"note": pair.note})
+            line["note"] = pair.note
+            writer.writerow({name: escape.cell(value) for name, value in line.items()})
         return buffer.getvalue()
 
 

@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from strainbench import escape
 from strainbench.converge import CANDIDATE, COLUMNS, CONVERGENCE
-from strainbench.records import RecordsError, read_machines, read_rows
+from strainbench.records import WORDS, RecordsError, read_machines, read_rows
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
 from strainbench.report.table import machine_line, power
 
 LEVELS = (1e-2, 1e-4, 1e-6)
-WORDS = ("problem", "scenario", "solver", "sampled_by", "status", "ending", "machine")
-"""Columns of convergence.csv that are not numbers."""
 PANELS = (
     ("max_violation", "largest violation", 1e-10),
     ("relative_gap", "relative gap", 1e-12),
@@ -32,7 +32,10 @@ Each method's iterates or answers, measured by the referee: a value is reached a
 from which on all are at most that. Methods marked ° show no iterates: these are whole runs at ever
 tighter tolerances, their seconds and iterations those of one such run. Seconds are on the
 solver's clock, set-up apart; the clock stands still while an iterate is kept. The gap is relative
-to the certified optimum, violations priced in."""
+to the certified optimum, violations priced in. Never: not even at the tightest tolerance, where the
+method ended by itself. Not within: the budget, which is for all of a method's runs together, ended
+first, and what it cut off is not counted. `-`: the method was stopped, or stopped, for the reason
+given below."""
 
 
 def load_convergence(folder: Path) -> pd.DataFrame:
@@ -67,6 +70,14 @@ def reached(rows: pd.DataFrame, measure: str, level: float) -> pd.Series | None:
     return None if after.empty else after.iloc[0]
 
 
+def unreached(rows: pd.DataFrame) -> str:
+    """Why a solver's samples do not reach a level: its budget, itself, or what stopped it."""
+    first = rows.iloc[0]
+    if first["ending"].startswith("time limit"):
+        return f"not within {first['time_limit']:g} s"
+    return "never" if first["ending"].startswith("it says") else "-"
+
+
 def write_convergence(folder: Path) -> list[Path]:
     """Write convergence.md, .svg and .png; return their paths."""
     table = load_convergence(folder)
@@ -80,13 +91,15 @@ def as_markdown(table: pd.DataFrame, machines: Any) -> str:
     first = table.iloc[0]
     title = f"{first['scenario']}, projection {first['frame']:.0f}"
     parts = [
-        f"# Convergence: {title}",
+        f"# Convergence: {escape.markdown(title)}",
         f"{first['variables']:.0f} variables, {first['constraints']:.0f} constraints. "
         + EXPLANATION.replace("\n", " "),
     ]
     for measure, name in (("relative_gap", "relative gap"), ("max_violation", "violation")):
         parts.append(f"## To reach a {name}\n\n" + _table(table, measure))
-    endings = [f"- {name}: {rows['ending'].iloc[0]}" for name, rows in methods(table)]
+    endings = [
+        f"- {escape.markdown(f'{name}: {rows.ending.iloc[0]}')}" for name, rows in methods(table)
+    ]
     parts.append("## How each ended\n\n" + "\n".join(endings))
     parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
     return "\n\n".join(parts) + "\n"
@@ -99,18 +112,24 @@ def _table(table: pd.DataFrame, measure: str) -> str:
         header += [f"{power(level)} [s]", "iterations"]
     lines = [[*header, "at the end"], ["---"] * (len(header) + 1)]
     for name, rows in methods(table):
-        line = [name]
+        line = [escape.markdown(name)]
         for level in LEVELS:
             at = reached(rows, measure, level)
-            line += ["-", "-"] if at is None else [f"{at.seconds:.2g}", f"{at.iterations:.0f}"]
+            line += [unreached(rows), ""] if at is None else _effort(at)
         last = rows[measure].iloc[-1]
         lines.append([*line, "-" if pd.isna(last) else power(last)])
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
+def _effort(sample: pd.Series) -> list[str]:
+    return [f"{sample['seconds']:.2g}", f"{sample['iterations']:.0f}"]
+
+
 def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
     """Rows violation, gap, distance; columns seconds, iterations."""
     drawn = [(n, rows) for n, rows in methods(table) if rows["seconds"].notna().any()]
+    if not drawn:
+        return []
     style = styles([name for name, _ in drawn])
     figure = Figure(figsize=(11.5, 10.5), layout="constrained")
     axes = figure.subplots(len(PANELS), len(AXES), sharex="col", sharey="row")
@@ -124,13 +143,16 @@ def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
             for label, rows in drawn:
                 _curve(ax, rows, against, measure, floor, style[label], label.endswith("°"))
             _frame(ax, start[measure], limits.get(measure, 0.0))
-        lowest = min(rows[measure].min() for _, rows in drawn)
-        row[0].set_ylim(max(lowest, floor) / 3, ABOVE * start[measure])
+        lowest = np.fmax(table[measure].min(), floor)
+        row[0].set_ylim(lowest / 3, ABOVE * np.fmax(start[measure], lowest))
         row[0].set_ylabel(name)
     for ax, (_, name) in zip(axes[-1], AXES, strict=True):
         ax.set_xlabel(name)
-    figure.suptitle(f"{start['scenario']}, projection {start['frame']:.0f}", size=11)
-    handles = [Line2D([], [], label=n, **_line(n.endswith("°")), **style[n]) for n, _ in drawn]
+    figure.suptitle(escape.chart(f"{start['scenario']}, projection {start['frame']:.0f}"), size=11)
+    handles = [
+        Line2D([], [], label=escape.chart(n), **_line(n.endswith("°")), **style[n])
+        for n, _ in drawn
+    ]
     handles.append(Line2D([], [], label="the candidate itself", **ITSELF))
     handles.append(Line2D([], [], label="reference certified to", **RESOLVED))
     handles.append(Line2D([], [], linestyle="none", label="° answers at tolerances"))
@@ -172,5 +194,5 @@ def _frame(ax: Axes, start: float, resolved: float) -> None:
     ax.set_yscale("log")
     ax.grid(visible=True, which="major", color="#dddddd", linewidth=0.6)
     ax.axhline(start, **ITSELF)
-    if resolved > 0:
+    if 0 < resolved < float("inf"):
         ax.axhline(resolved, **RESOLVED)

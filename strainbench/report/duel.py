@@ -11,6 +11,7 @@ from pathlib import Path
 from rich import box
 from rich.table import Table
 
+from strainbench import escape
 from strainbench.duel import FACTORISATION, IMPLICIT_EULER, Entry
 from strainbench.records import open_folder
 from strainbench.report.table import machine_line, power
@@ -119,20 +120,20 @@ class Outcome:
     def table(self) -> Table:
         """For the terminal."""
         header, *lines = self.lines()
-        grid = Table(title=self.title, title_justify="left", box=box.MARKDOWN)
+        grid = Table(title=escape.terminal(self.title), title_justify="left", box=box.MARKDOWN)
         for name in header:
             grid.add_column(name, no_wrap=True)
         for line in lines:
-            grid.add_row(*line)
+            grid.add_row(*map(escape.terminal, line))
         return grid
 
     def markdown(self) -> str:
         """All of it, with command and machine."""
         header, *lines = self.lines()
-        rows = [header, ("---",) * len(header), *lines]
+        rows = [header, ("---",) * len(header), *(map(escape.markdown, line) for line in lines)]
         parts = [
-            f"# Duel: {self.title}",
-            f"`{self.command}`",
+            f"# Duel: {escape.markdown(self.title)}",
+            escape.code(self.command),
             EXPLANATION,
             "\n".join(f"| {' | '.join(row)} |" for row in rows),
             "\n".join(machine_line(name, facts) for name, facts in self.machines.items()),
@@ -144,7 +145,7 @@ class Outcome:
         buffer = io.StringIO()
         writer = csv.DictWriter(buffer, CSV_HEADER, lineterminator="\n")
         writer.writeheader()
-        writer.writerows(self.rows())
+        writer.writerows({k: escape.cell(v) for k, v in row.items()} for row in self.rows())
         return buffer.getvalue()
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
-from strainbench.records import STEP_COLUMNS, STEPS, read_rows
+from strainbench import escape
+from strainbench.records import STEP_COLUMNS, latest_steps
 from strainbench.report.chart import COLOURS, save
 from strainbench.report.table import UNCONSTRAINED
 
@@ -36,7 +37,7 @@ def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     Columns: cell, panel and curve (what tells its panel and its curve from others), time [s],
     energy [J].
     """
-    steps = pd.DataFrame(read_rows(folder / STEPS, STEP_COLUMNS), columns=list(STEP_COLUMNS))
+    steps = pd.DataFrame(latest_steps(folder), columns=list(STEP_COLUMNS))
     for column in ("step", "time", *PARTS):
         steps[column] = pd.to_numeric(steps[column].replace("nan", ""))
     steps = steps.dropna(subset=["time", "kinetic_energy"]).drop_duplicates(
@@ -71,7 +72,8 @@ def energy_markdown(folder: Path, runs: pd.DataFrame) -> str:
         values = (energy[0], energy.max(), energy[-1], late.max() - late.min())
         first, end = run.iloc[0], run["time"].max()
         numbers = " | ".join(f"{v:.4g}" for v in (end, *values))
-        lines.append(f"| {first['panel']} | {first['curve']} | {len(run)} | {numbers} |")
+        words = " | ".join(escape.markdown(first[k]) for k in ("panel", "curve"))
+        lines.append(f"| {words} | {len(run)} | {numbers} |")
     return "\n".join([TABLE, *lines]) + "\n" if lines else ""
 
 
@@ -93,12 +95,12 @@ def draw_energy(folder: Path, runs: pd.DataFrame) -> list[Path]:
                 color=COLOURS[k % len(COLOURS)],
                 linestyle=DASHES[k // len(COLOURS) % len(DASHES)],
                 linewidth=1.4,
-                label=curve,
+                label=escape.chart(curve),
             )
         start = 1000 * float(shown.groupby("cell")["energy"].first().max())
         lowest = 1000 * float(shown.groupby("cell")["energy"].min().median())
         ax.set_ylim(LOW * min(lowest, start - 1e-9), start + abs(lowest - start))
-        ax.set_title(panel, size=10)
+        ax.set_title(escape.chart(panel), size=10)
         ax.set_xlabel("time [s]")
         ax.set_ylabel("total energy [mJ]")
         ax.grid(visible=True, color="#dddddd", linewidth=0.6)

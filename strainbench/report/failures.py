@@ -14,8 +14,9 @@ from typing import Any
 
 import pandas as pd
 
+from strainbench import escape
 from strainbench.discovery import find_scenario
-from strainbench.records import STEP_COLUMNS, STEPS, read_rows
+from strainbench.records import latest_steps
 from strainbench.referee import OUTCOMES
 from strainbench.report.table import UNCONSTRAINED, machine_line, power
 
@@ -76,7 +77,7 @@ def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
 
 def _statuses(folder: Path) -> dict[tuple[str, str], str]:
     """What the solver says of a cell's projections of each outcome."""
-    latest = {(r["cell"], r["projection"]): r for r in read_rows(folder / STEPS, STEP_COLUMNS)}
+    latest = {(r["cell"], r["projection"]): r for r in latest_steps(folder)}
     found: dict[tuple[str, str], set[str]] = {}
     for row in latest.values():
         found.setdefault((row["cell"], row["outcome"]), set()).add(row["status"])
@@ -153,18 +154,22 @@ def failures_markdown(
     """Methods against cases, what the signs mean, a line for each failure, the machine."""
     cases, methods = list(dict.fromkeys(table["case"])), list(dict.fromkeys(table["method"]))
     cells = {(r["case"], r["method"]): _cell(r) for _, r in table.iterrows()}
-    lines = [["method", *cases], ["---"] * (1 + len(cases))]
-    lines += [[m, *(cells.get((c, m), "") for c in cases)] for m in methods]
+    lines = [["method", *map(escape.markdown, cases)], ["---"] * (1 + len(cases))]
+    lines += [
+        [escape.markdown(m), *(escape.markdown(cells.get((c, m), "")) for c in cases)]
+        for m in methods
+    ]
     first = runs.iloc[0]
     limits = {"violation": first["violation_threshold"], "gap": first["gap_threshold"]}
     parts = ["# Where methods fail", EXPLANATION.format(**limits)]
     parts.append("\n".join("| " + " | ".join(line) + " |" for line in lines))
     for case, rows in table[table["sign"] != PASSED].groupby("case", sort=False):
         reasons = [
-            f"- {r['method']}: {r['found']}; {r['verdict']}. In full: {r['reason']}"
+            f"{r['method']}: {r['found']}; {r['verdict']}. In full: {r['reason']}"
             for _, r in rows.iterrows()
         ]
-        parts.append(f"## {case}\n\n" + "\n".join(reasons))
+        listed = "\n".join(f"- {escape.markdown(reason)}" for reason in reasons)
+        parts.append(f"## {escape.markdown(case)}\n\n{listed}")
     parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
     return "\n\n".join(parts) + "\n"
 

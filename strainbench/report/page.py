@@ -9,6 +9,7 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader
 from markupsafe import Markup
 
+from strainbench import escape
 from strainbench.report import warm
 from strainbench.report.table import (
     accuracy_text,
@@ -44,9 +45,9 @@ def write_page(
         twins_explanation=warm.EXPLANATION.replace("`", ""),
         time_text=time_text,
         accuracy_text=accuracy_text,
-        reasons=reasons(runs),
+        reasons=[escape.plain(reason) for reason in reasons(runs)],
         details=details(runs),
         ledger=ledger(runs).itertuples(index=False),
         machines=machines,
     )
-    path.write_text(page)
+    path.write_text(page, encoding="utf-8")

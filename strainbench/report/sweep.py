@@ -8,6 +8,7 @@ from pathlib import Path
 import pandas as pd
 from matplotlib.figure import Figure
 
+from strainbench import escape
 from strainbench.report.chart import FLOOR_MM, save, styles
 from strainbench.report.table import UNCONSTRAINED, accuracy_text, describe, time_text
 
@@ -68,7 +69,7 @@ def sweep_markdown(runs: pd.DataFrame) -> list[str]:
             first = group.iloc[0]
             about = describe(first["rest"])
             solvers = list(dict.fromkeys(group["solver"]))
-            header = [key, *(t for s in solvers for t in (f"{s} [s]", *columns))]
+            header = [key, *(t for s in solvers for t in (f"{escape.markdown(s)} [s]", *columns))]
             lines = [header, ["---"] * len(header)]
             for _, at in group.groupby("value"):
                 by_solver = {r["solver"]: r for _, r in at.iterrows()}
@@ -77,9 +78,10 @@ def sweep_markdown(runs: pd.DataFrame) -> list[str]:
                     for s in solvers
                     for text in (time_text, accuracy_text, beyond_text)
                 ]
-                lines.append([at["shown"].iloc[0], *texts])
+                lines.append([escape.markdown(at["shown"].iloc[0]), *texts])
             table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-            parts.append(f"## {first['scenario']} against {key} ({mode}, {about})\n\n{table}")
+            title = f"{first['scenario']} against {key} ({mode}, {about})"
+            parts.append(f"## {escape.markdown(title)}\n\n{table}")
     return parts
 
 
@@ -96,7 +98,9 @@ def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:
             label = solver if not several else f"{solver}, {_differs(rest, rows)}"
             answered = line[line["outcome"] != "no answer"]
             look = {**style[f"{solver} {rest}"], "markersize": 5, "linewidth": 1.2}
-            axes[0].plot(answered["value"], answered["solve_seconds_mean"], label=label, **look)
+            axes[0].plot(
+                answered["value"], answered["solve_seconds_mean"], label=escape.chart(label), **look
+            )
             millimetres = (1000 * answered["distance_max"]).clip(lower=FLOOR_MM)
             axes[1].plot(answered["value"], millimetres, **look)
             excess = beyond(answered).clip(lower=FLOOR)
@@ -106,7 +110,7 @@ def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:
             if rows["value"].min() > 0 and rows["value"].max() > 8 * rows["value"].min():
                 ax.set_xscale("log")
             ticks = rows.drop_duplicates("value")
-            ax.set_xticks(ticks["value"], ticks["shown"], size=8)
+            ax.set_xticks(ticks["value"], [escape.chart(v) for v in ticks["shown"]], size=8)
             ax.xaxis.minorticks_off()
             ax.set_xlabel(key)
             ax.set_ylabel(name)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from strainbench import escape
 from strainbench.report import warm
 
 GROUP = ["scenario", "mode", "setting", "tolerance", "steps_asked"]
@@ -63,7 +64,7 @@ class Group:
 def describe(parameters: str, without: tuple[str, ...] = ()) -> str:
     """Settings from their JSON, on a line."""
     return ", ".join(
-        f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}"
+        f"{key} {value:.4g}" if isinstance(value, float) else escape.plain(f"{key} {value}")
         for key, value in json.loads(parameters or "{}").items()
         if key not in without
     )
@@ -175,7 +176,9 @@ def _ledger_markdown(runs: pd.DataFrame) -> str:
     header = [*names, "active at most", "non-zeros"]
     lines = [_line(header), _line(["---"] * len(header))]
     for values in ledger(runs).itertuples(index=False):
-        lines.append(_line([f"{v:.0f}" if isinstance(v, float) else str(v) for v in values]))
+        lines.append(
+            _line([f"{v:.0f}" if isinstance(v, float) else escape.markdown(v) for v in values])
+        )
     return "## Model ledger\n\n" + "\n".join(lines)
 
 
@@ -185,11 +188,11 @@ def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
     parts += [_markdown_group(group) for group in groups(runs)]
     if twins := warm.pairs(runs):
         lines = [_line(list(warm.HEADER)), _line(["---"] * len(warm.HEADER))]
-        lines += [_line(list(pair.line())) for pair in twins]
+        lines += [_line([escape.markdown(text) for text in pair.line()]) for pair in twins]
         parts.append("## Cold and warm starts\n\n" + warm.EXPLANATION + "\n\n" + "\n".join(lines))
-    if lines := [f"- {reason}" for reason in reasons(runs)]:
+    if lines := [f"- {escape.markdown(reason)}" for reason in reasons(runs)]:
         parts.append("## What kept a cell from optimal\n\n" + "\n".join(lines))
-    if lines := [f"- {line}" for line in details(runs)]:
+    if lines := [f"- {escape.markdown(line)}" for line in details(runs)]:
         parts.append("## Inside the solve, means\n\n" + "\n".join(lines))
     parts.append(_ledger_markdown(runs))
     parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
@@ -200,7 +203,7 @@ def _markdown_group(group: Group) -> str:
     header = ["limit", "method"]
     for n in group.resolutions:
         header += [f"{n}×{n} [s]", "violation · gap · mm"]
-    lines = [f"## {group.title}", "", _line(header), _line(["---"] * len(header))]
+    lines = [f"## {escape.markdown(group.title)}", "", _line(header), _line(["---"] * len(header))]
     euler = group.implicit_euler()
     cells = [f"{s:.4f}" if s == s else "" for s in euler]  # not NaN
     lines.append(_line(["", "implicit Euler", *(t for c in cells for t in (c, ""))]))
@@ -209,7 +212,7 @@ def _markdown_group(group: Group) -> str:
         for row in rows:
             bold = "**" if row is not None and row["outcome"] == "optimal" else ""
             texts += [f"{bold}{time_text(row)}{bold}", accuracy_text(row)]
-        lines.append(_line([limit, solver, *texts]))
+        lines.append(_line([limit, escape.markdown(solver), *texts]))
     return "\n".join(lines)
 
 
@@ -218,10 +221,10 @@ def _line(cells: list[str]) -> str:
 
 
 def machine_line(name: str, facts: Mapping[str, object]) -> str:
-    """A machine and its facts in one line."""
+    """A machine and its facts in one line of Markdown."""
     packages = facts.get("packages")
     versions = packages.items() if isinstance(packages, Mapping) else ()
-    return (
+    return escape.markdown(
         f"{name}: {facts['memory_gb']} GB, {facts['system']}, Python {facts['python']}, "
         f"{facts['threads_per_solver']} thread a solver; "
         + ", ".join(f"{package} {version}" for package, version in versions)
@@ -234,7 +237,7 @@ def as_latex(runs: pd.DataFrame) -> str:
     for group in groups(runs):
         columns = " & ".join(rf"${n}\times{n}$" for n in group.resolutions)
         lines = [
-            f"% {group.title}",
+            f"% {escape.plain(group.title)}",
             rf"\begin{{tabular}}{{ll{'r' * len(group.resolutions)}}}",
             rf"limit & method & {columns} \\ \hline",
         ]
@@ -242,6 +245,6 @@ def as_latex(runs: pd.DataFrame) -> str:
         lines.append(" & ".join(["", "implicit Euler", *euler]) + r" \\")
         for limit, solver, rows in group.blocks():
             texts = [time_text(r) for r in rows]
-            lines.append(" & ".join([limit.replace("%", r"\%"), solver, *texts]) + r" \\")
+            lines.append(" & ".join([escape.latex(limit), escape.latex(solver), *texts]) + r" \\")
         parts.append("\n".join([*lines, r"\end{tabular}"]))
     return "\n\n".join(parts) + "\n"

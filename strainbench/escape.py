@@ -1,0 +1,105 @@
+"""Foreign text (names, labels, reasons, what solvers say) in each form that the suite writes.
+
+A plug-in's words are its own: whatever they hold is shown as it is, and is markup nowhere.
+"""
+
+from __future__ import annotations
+
+import re
+
+from rich.text import Text
+
+ANSI = re.compile(r"\x1b(?:\][^\x07\x1b]*(?:\x07|\x1b\\)|\[[0-?]*[ -/]*[@-~]|[@-Z\\-_])")
+UNSEEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Controls, those of the direction of writing, line separators, halves of surrogate pairs."""
+FORMULA = ("=", "+", "-", "@")
+MARKDOWN = (
+    (re.compile(r"([\\`*|~])"), r"\\\1"),
+    (re.compile(r"&"), "&amp;"),
+    (re.compile(r"<"), "&lt;"),
+    (re.compile(r"(?<![^\W_])_|_(?![^\W_])"), r"\\_"),  # within a word it is no emphasis
+    (re.compile(r"\](?=[(:\[])"), r"\\]"),  # a link's; other brackets are plain
+    (re.compile(r"^([#>=\[]|[+-](?=\s|--))"), r"\\\1"),  # what would begin a heading, an item,
+    (re.compile(r"^(\d+)([.)])(?=\s|$)"), r"\1\\\2"),  # or a numbered one
+)
+LATEX = str.maketrans(
+    {
+        "\\": r"\textbackslash{}",
+        "{": r"\{",
+        "}": r"\}",
+        "$": r"\$",
+        "&": r"\&",
+        "#": r"\#",
+        "%": r"\%",
+        "_": r"\_",
+        "^": r"\textasciicircum{}",
+        "~": r"\textasciitilde{}",
+        "<": r"\textless{}",
+        ">": r"\textgreater{}",
+        "|": r"\textbar{}",
+        "`": r"\textasciigrave{}",
+        "·": r"\textperiodcentered{}",
+        "×": r"\texttimes{}",
+        "°": r"\textdegree{}",
+        "µ": r"\textmu{}",
+        "→": r"$\to$",
+        "≤": r"$\le$",
+        "≥": r"$\ge$",
+        "…": r"\dots{}",
+    }
+)
+"""Letters beyond Latin stay as they are: LuaLaTeX and XeLaTeX read them."""
+
+
+def plain(text: object) -> str:
+    """One line that changes nothing on a terminal: no control characters, no ANSI sequences."""
+    return " ".join(UNSEEN.sub(" ", ANSI.sub("", str(text))).split())
+
+
+def terminal(text: object) -> Text:
+    """For rich, which reads a string as markup, and `:name:` as an emoji."""
+    return Text(plain(text))
+
+
+def markdown(text: object) -> str:
+    """For a cell of a table, a heading or an item of a list."""
+    words = plain(text)
+    for pattern, replacement in MARKDOWN:
+        words = pattern.sub(replacement, words)
+    return words
+
+
+def code(text: object) -> str:
+    """A span of code in Markdown, fenced by more backticks than the text has in a row."""
+    words = plain(text)
+    fence = "`" * (1 + max((len(run) for run in re.findall("`+", words)), default=0))
+    room = " " if words.startswith("`") or words.endswith("`") else ""
+    return f"{fence}{room}{words}{room}{fence}"
+
+
+def latex(text: object) -> str:
+    """For text in LaTeX."""
+    return plain(text).translate(LATEX).replace("--", "-{}-")  # two would be a dash
+
+
+def chart(text: object) -> str:
+    """For matplotlib, which reads what stands between two dollars as mathematics."""
+    words = plain(text).replace("$", r"\$")
+    return f" {words}" if words.startswith("_") else words  # it keeps such names out of legends
+
+
+def cell(value: object) -> object:
+    """A cell of a derived CSV: text that a spreadsheet would take for a formula is quoted."""
+    if not isinstance(value, str):
+        return value
+    words = plain(value) if UNSEEN.search(value) else value
+    formula = len(words) > 1 and words.lstrip().startswith(FORMULA) and not _is_number(words)
+    return f"'{words}" if formula else words
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
