@@ -92,8 +92,8 @@ def cell(value: object) -> object:
     """A cell of a derived CSV: text that a spreadsheet would take for a formula is quoted."""
     if not isinstance(value, str):
         return value
-    words = plain(value) if UNSEEN.search(value) else value
-    formula = len(words) > 1 and words.lstrip().startswith(FORMULA) and not _is_number(words)
+    words = plain(value)
+    formula = len(words) > 1 and words.startswith(FORMULA) and not _is_number(words)
     return f"'{words}" if formula else words
 
 

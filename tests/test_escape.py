@@ -80,7 +80,7 @@ def test_a_markdown_item_and_heading_read_as_the_text(words):
     plain = escape.plain(words)
     reader = MarkdownIt("commonmark").enable(["table", "strikethrough"])
     html = reader.render(f"- {escape.markdown(words)}\n\n## {escape.markdown(words)} \n")
-    if plain:
+    if plain not in ("", "-", "+"):  # a mark of ours in tables, never an item
         assert unescape(html) == f"<ul>\n<li>{plain}</li>\n</ul>\n<h2>{plain}</h2>\n"
 
 
@@ -244,7 +244,7 @@ def test_a_comparison_shows_any_text_as_it_is(folder, nasty, monkeypatch, capsys
         assert plain in done.stdout
         assert "\x1b" not in done.stdout
     assert plain in table_cells((tmp_path / "c.md").read_text())[0]
-    rows = list(csv.DictReader((tmp_path / "c.csv").open(newline="")))
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "c.csv").read_text())))
     assert {row["solver"] for row in rows} == {escape.cell(nasty)}
 
 
