@@ -317,8 +317,9 @@ def damages(text):
     yield "blank line", r"record 3 has 0 fields", "".join([header, first, "\n", *rest])
     yield "header twice", r"record 3: the header once more", "".join([header, first, header, *rest])
     yield "open quote", r"record 3 has \d+ fields", "".join([header, first, '1,"b,', *rest])
-    last = text[: text.rindex("some machine")] + '"some machine\n'
-    yield "open quote at the end", r"record 4, column machine: an end of line", last
+    name = RUN_COLUMNS[-1]
+    last = text[: text.rindex(f"some {name}")] + f'"some {name}\n'
+    yield "open quote at the end", rf"record 4, column {name}: an end of line", last
     for name, wrong, valid in [
         ("schema", "two", f"1 to {SCHEMA} is"),
         ("schema", "0", f"1 to {SCHEMA} is"),
