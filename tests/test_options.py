@@ -171,7 +171,7 @@ def test_mp4_alone_needs_ffmpeg(monkeypatch, capsys, tmp_path):
 
 def test_without_a_word_the_help_is_shown(monkeypatch, capsys):
     done = command(monkeypatch, capsys)
-    assert "Usage: strainbench" in done.stdout
+    assert "Usage: " in done.stdout
     assert "a command is missing; valid are list, run, report" in is_one_line(done)
     commands = get_command(cli.app).commands
     assert set(cli.VERBS) == set(commands)

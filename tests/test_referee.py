@@ -468,7 +468,7 @@ def test_a_reference_is_kept_and_used_again(rng):
 def test_a_kept_reference_is_not_believed(rng):
     problem, placed = random_placed_problem(rng)
     huge = 1e6 * rng.normal(size=(problem.rows, 3))
-    ref = ReferenceSolver(problem, {content_key(problem): (problem.target, huge)})(problem)
+    ref = ReferenceSolver(problem, {content_key(problem): (problem.target, huge, None)})(problem)
     assert ref.error == np.inf
     assert ref.lower_bound <= problem.objective(placed)
 
