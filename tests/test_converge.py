@@ -168,7 +168,7 @@ def test_another_frame_is_refused_and_another_solver_is_added(folder, tmp_path):
     run(4, "clarabel.scaling=2")
     run(4, "clarabel.scaling=2")
     table = load_convergence(folder)
-    again = samples_of(table, "clarabel[scaling=2.0]")
+    again = samples_of(table, "clarabel[scaling=2]")
     assert again["tolerance"].tolist() == pytest.approx(tolerances(1e-2))
     assert len(samples_of(table, "slow")) > 30
 
