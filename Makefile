@@ -85,7 +85,7 @@ report: setup ## tables and charts from results/local/bench again
 	$(BIN)/strainbench report --results $(BENCH)
 
 clean: ## remove the virtual environment and caches, keep every result
-	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(VENV)/.done: pyproject.toml Makefile

@@ -49,6 +49,7 @@ def slug(title: str) -> str:
 
 
 HOWTO = {title: f"howto/{slug(title)}.md" for title in sections("CONTRIBUTING.md")}
+HOWTO[INTRO] = "howto/develop.md"
 EXAMPLES = sorted(path.stem for path in (ROOT / "examples").glob("*.py"))
 
 

@@ -41,8 +41,7 @@ class Strip(SheetScenario):
         while True:
             candidate = x + STEP * v + STEP**2 * np.array([0, -9.81, 0])
             candidate[[0, 1]] = x[[0, 1]]
-            moved = project(candidate)
-            x, v, k = moved, (moved - x) / STEP, k + 1
+            x, v, k = (moved := project(candidate)), (moved - x) / STEP, k + 1
             yield StepReport(time=k * STEP)
 
 

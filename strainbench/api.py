@@ -36,6 +36,15 @@ def solve(
     ValueError
         For an unknown or unavailable solver, one that does not support the problem, a tolerance
         that is not positive, a negative time limit, or no whole number of threads.
+
+    Examples
+    --------
+    Both ends of an edge that is 0.2 m too long move by half of that:
+
+    >>> rest, target = [[0, 0], [1, 0], [0, 1]], [[0, 0, 0], [1.3, 0, 0], [0, 1, 0]]
+    >>> problem = Problem(rest, [[0, 1, 2]], target, StretchLimits.isotropic(1.1, directions=2))
+    >>> solve(problem, "newton-ipm").positions[:2, 0].round(4).tolist()
+    [0.1, 1.2]
     """
     if not tolerance > 0:
         raise ValueError(f"tolerance is {tolerance}: a number above 0 is valid")

@@ -64,6 +64,11 @@ class StretchLimits:
         Naming the field, the index and the value: a bound that is not positive and finite,
         a lower one above it, a direction that is not a unit vector, one that is given twice
         with different bounds, or shapes that do not match.
+
+    Examples
+    --------
+    >>> StretchLimits.isotropic(1.01, directions=4).bounds.tolist()
+    [1.01, 1.01, 1.01, 1.01]
     """
 
     directions: FloatArray

@@ -138,6 +138,15 @@ class Problem:
     ------
     ValueError
         Naming the field, the index and the value.
+
+    Examples
+    --------
+    An edge of 1 m pulled to 1.3 m, 0.2 m beyond its limit:
+
+    >>> rest, target = [[0, 0], [1, 0], [0, 1]], [[0, 0, 0], [1.3, 0, 0], [0, 1, 0]]
+    >>> problem = Problem(rest, [[0, 1, 2]], target, StretchLimits.isotropic(1.1, directions=2))
+    >>> float(problem.violations(problem.target).max().round(6))
+    0.2
     """
 
     rest: FloatArray

@@ -101,6 +101,16 @@ def certify(
     ------
     ValueError
         If a threshold is not positive, or for no whole number of threads.
+
+    Examples
+    --------
+    What violates no limit need not be the projection: a sheet at rest, far from its target.
+
+    >>> rest, target = [[0, 0], [1, 0], [0, 1]], [[0, 0, 0], [1.3, 0, 0], [0, 1, 0]]
+    >>> problem = Problem(rest, [[0, 1, 2]], target, StretchLimits.isotropic(1.1, directions=2))
+    >>> found = certify(problem, [[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    >>> found.outcome, round(found.objective, 3), round(found.lower_bound, 3)
+    ('feasible', 0.045, 0.01)
     """
     if not (violation > 0 and gap > 0):
         raise ValueError(f"violation is {violation} and gap {gap}: numbers above 0 are valid")

@@ -1,0 +1,28 @@
+"""Examples in the docstrings of the public face are true."""
+
+from __future__ import annotations
+
+import doctest
+
+import pytest
+
+import strainbench
+
+FACE = {name: getattr(strainbench, name) for name in strainbench.__all__}
+FOUND = [
+    test
+    for name, thing in FACE.items()
+    for test in doctest.DocTestFinder().find(thing, name, globs=dict(FACE))
+    if test.examples
+]
+
+
+def test_the_first_things_that_one_needs_have_an_example():
+    assert {"Problem", "StretchLimits", "solve", "certify"} <= {test.name for test in FOUND}
+
+
+@pytest.mark.parametrize("found", FOUND, ids=lambda test: test.name)
+def test_examples_in_docstrings(found):
+    failed, tried = doctest.DocTestRunner().run(found)
+    assert failed == 0
+    assert tried > 0
