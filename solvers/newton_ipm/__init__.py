@@ -93,7 +93,7 @@ pins alone are too far apart |
 no factor any more; the best iterate is returned |
     | stalled: limits without an interior | wider limits are solved, these not to the tolerance: \
 multipliers have no bound, and the referee's may price a violation higher than the answer's own |
-| iteration limit, time limit | neither of these before |
+    | iteration limit, time limit | neither of these before |
 
     Parameters
     ----------
