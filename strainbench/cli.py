@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import shlex
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import psutil
 import typer
@@ -34,6 +35,7 @@ from strainbench.problem import Problem
 from strainbench.records import RecordsError
 from strainbench.reference import REFERENCE_SOLVER
 from strainbench.runner import Observer, Runner, Settings, Summary
+from strainbench.scenario import SceneWarning
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -529,10 +531,29 @@ def _print_summary(summary: Summary, planned: int, results: Path) -> None:
     console.print(f"results in {results}", highlight=False)
 
 
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,  # noqa: ARG001
+    line: str | None = None,
+) -> None:
+    """What a scene says is one line; all else as Python has it."""
+    if issubclass(category, SceneWarning):
+        errors.print(f"strainbench: note: {message}", markup=False)
+    else:
+        text = warnings.formatwarning(message, category, filename, lineno, line)
+        errors.print(text, markup=False)
+
+
 def main() -> None:
     """Run the command line; exit 2 with one line for a wrong word, 130 when interrupted."""
     try:
-        status = app(standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", SceneWarning)
+            warnings.showwarning = _show_warning
+            status = app(standalone_mode=False)
     except typer.TyperException as error:
         message = getattr(error, "format_message", error.__str__)()
         errors.print(f"strainbench: {message} (strainbench --help lists what is valid)")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from itertools import product
@@ -17,7 +19,7 @@ from strainbench.discovery import (
     list_solvers,
     load_file,
 )
-from strainbench.scenario import Scenario
+from strainbench.scenario import Scenario, SceneWarning
 from strainbench.solver import Solver, warm_twin
 
 MODES = ("simulate", "replay")
@@ -39,8 +41,23 @@ def parse_settings(words: Iterable[str]) -> Choices:
         owner, _, name = key.rpartition(".")
         if not equals or not name or not values:
             raise ValueError(f"--set {word}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
-        choices.setdefault(owner, {}).setdefault(name, []).extend(values.split(","))
+        choices.setdefault(owner, {}).setdefault(name, []).extend(split_values(values))
     return choices
+
+
+def split_values(text: str) -> list[str]:
+    """Values between commas; one in double quotes, or that is a file as it stands, keeps its own.
+
+    >>> split_values('"a,b.obj",c.obj')
+    ['a,b.obj', 'c.obj']
+    """
+    if "," in text and Path(text).expanduser().is_file():
+        return [text]
+    try:
+        return next(csv.reader([text], strict=True))
+    except csv.Error as error:
+        valid = 'V1,V2 or "V1,V2" for one value with a comma is valid'
+        raise ValueError(f"--set ...={text!r}: {valid} ({error})") from None
 
 
 def parse_value(owner: str, key: str, hint: Any, text: str) -> object:
@@ -88,7 +105,10 @@ def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
     for word in words:
         classes = load_file(word, Scenario) if is_file(word) else [find_scenario(word)]
         path = str(Path(word).resolve()) if is_file(word) else None
-        refs += [PluginRef.of(s, path) for c in classes for s in variations(c, choices, True)]
+        scenes: list[Scenario] = [s for c in classes for s in variations(c, choices, True)]
+        refs += [PluginRef.of(s, path) for s in scenes]
+        for note in dict.fromkeys(note for s in scenes for note in s.notes()):
+            warnings.warn(note, SceneWarning, stacklevel=2)
     return refs
 
 

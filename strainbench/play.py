@@ -111,6 +111,7 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
         nonzeros=3 * problem.G.nnz,
         needs=", ".join(sorted(scenario.needs)),
         blas_threads=threads,
+        notes=scenario.notes(),
     )
     if refusal := solver.supports(problem):
         raise Stop(f"unsupported: {refusal}")
