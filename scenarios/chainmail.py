@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -41,8 +42,9 @@ class Chainmail(ClothScenario):
     limit : the largest strain over all directions; it scales the pattern's curve.
     directions : samples of the pattern's curve.
     pattern : "rows" or "hexagonal".
-    curve_file : path of a measured curve, a CSV file with the columns angle_degrees and bound.
-        It is taken as it stands: `limit`, `directions` and `pattern` stay at their defaults.
+    curve_file : path of a measured curve, a CSV file with the columns angle_degrees and bound, or
+        strain or percent instead of bound; "~" is the home folder. It is taken as it stands:
+        `limit`, `directions` and `pattern` stay at their defaults.
     """
 
     name = "chainmail"
@@ -59,6 +61,7 @@ class Chainmail(ClothScenario):
         if self.pattern not in PATTERNS:
             valid = ", ".join(PATTERNS)
             raise ValueError(f"pattern is {self.pattern!r}: valid are {valid}")
+        object.__setattr__(self, "curve_file", os.path.expanduser(self.curve_file))
         if not self.curve_file:
             self.sampled_angles()
             return

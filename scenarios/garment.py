@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from strainbench.limits import FloatArray
+from strainbench.meshcheck import level_openings, odd_edges, parts, pattern_stretches, unsewn
 from strainbench.meshfile import MeshFile, flattened, read_mesh
 from strainbench.problem import IntArray
 from strainbench.scenario import ClothScenario
@@ -18,6 +20,16 @@ DATA = Path(__file__).parent / "data"
 WAIST, HEM, SLANT = 0.10, 0.25, 0.40
 """Radii and slant height of the skirt [m]: a small A-line skirt, made up."""
 RESTS = ("auto", "texture", "flattened")
+TURNS = {
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]),
+    "x": np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+}
+"""The rotation that takes each up axis to y."""
+PATTERN, CLOSE = 1.25, 1.05
+"""A pattern's lengths over those in space lie between 1/1.25 and 1.25 but for 5% of the area, as
+no drape of cloth reaches that; outside 1/1.05 to 1.05, which a body's fit may reach, it is said.
+Both are chosen by us: an atlas unwrapped with little distortion, in metres, is a pattern."""
 
 
 @dataclass(frozen=True)
@@ -29,13 +41,17 @@ class Garment(ClothScenario):
     Each triangle's rest shape is its texture coordinates where the file has them (OBJ only), as
     pattern pieces in the unit of the positions; seams need nothing else. Otherwise it is the
     triangle as it lies in space, its first material axis horizontal. Hinges are flat at rest.
+    A texture whose triangles have other shapes than those in space is an atlas, no pattern, and
+    refused: where lengths on more than 5% of the area differ by more than a factor of 1.25.
 
     Parameters
     ----------
     path : a file that meshio reads (OBJ, PLY, STL, VTK ...), or a name in scenarios/data; "" is
-        the skirt.
+        the skirt; "~" is the home folder.
     scale : length of the file's unit [m]; the skirt is in metres.
-    rest : "texture", "flattened", or "auto": texture where there is one.
+    up : the file's axis that points up, "x", "y" or "z"; "auto" is y, and says so where it looks
+        like z.
+    rest : "texture" whatever its shapes, "flattened", or "auto": texture where there is one.
     pin_fraction : the vertices in the highest such part of the height are pinned; 0 pins the
         highest alone.
     """
@@ -46,6 +62,7 @@ class Garment(ClothScenario):
     norm: str = "mass"
     path: str = ""
     scale: float = 1.0
+    up: str = "auto"
     rest: str = "auto"
     pin_fraction: float = 0.01
 
@@ -53,38 +70,79 @@ class Garment(ClothScenario):
         super().__post_init__()
         if not 0 < self.scale < float("inf"):
             raise ValueError(f"scale is {self.scale}: a number above 0 is valid")
+        if self.up not in ("auto", *TURNS):
+            raise ValueError(f"up is {self.up!r}: valid are auto, x, y, z")
         if self.rest not in RESTS:
             raise ValueError(f"rest is {self.rest!r}: valid are {', '.join(RESTS)}")
         if not 0 <= self.pin_fraction < 1:
             raise ValueError(
                 f"pin_fraction is {self.pin_fraction}: a number from 0 to below 1 is valid"
             )
+        object.__setattr__(self, "path", os.path.expanduser(self.path))
         if self.path:
-            self._mesh  # noqa: B018  # a bad file is named before anything runs
+            self.pattern()  # a bad file is named before anything runs
 
     @cached_property
     def _mesh(self) -> MeshFile:
         if not self.path:
             return skirt(self.resolution)
         file = Path(self.path)
-        return read_mesh(file if file.exists() or not (DATA / file).exists() else DATA / file)
+        found = file if file.exists() or not (DATA / file).exists() else DATA / file
+        mesh = read_mesh(found, texture=self.rest != "flattened")
+        turn = TURNS["y" if self.up == "auto" else self.up]
+        return replace(mesh, positions=mesh.positions @ turn.T)
 
     def pattern(self) -> FloatArray:
         """(e, 3, 2) rest positions of each triangle's corners [m]."""
         mesh = self._mesh
-        flat = self.scale * flattened(mesh.positions, mesh.elements)
+        flat = flattened(mesh.positions, mesh.elements)
         if self.rest == "flattened" or (self.rest == "auto" and mesh.texture is None):
-            return flat
+            return self.scale * flat
         if mesh.texture is None:
             raise ValueError(f"rest is 'texture', but {self.path} has no texture coordinates")
-        pieces = self.scale * mesh.texture
-        ratio = float(np.sqrt(doubled_areas(pieces).sum() / doubled_areas(flat).sum()))
-        if not 0.5 < ratio < 2:
+        if self.rest == "auto" and (odd := self._off_pattern(PATTERN)):
             raise ValueError(
-                f"{self.path}: lengths on the texture are {ratio:.3g} times those in space, so it "
-                f"is no pattern in the unit of the positions; rest=flattened does without"
+                f"{self.path}: {odd}, so it is no pattern in the unit of the positions; "
+                "rest=flattened does without, rest=texture takes it"
             )
-        return pieces
+        return self.scale * mesh.texture
+
+    def _off_pattern(self, factor: float) -> str:
+        """How lengths on the texture differ, if by more than `factor` on over 5% of the area."""
+        mesh = self._mesh
+        assert mesh.texture is not None
+        flat = flattened(mesh.positions, mesh.elements)
+        ratios, areas = pattern_stretches(flat, mesh.texture), doubled_areas(flat)
+        off = ((ratios > factor) | (ratios < 1 / factor)).any(axis=1)
+        if areas[off].sum() <= 0.05 * areas.sum():
+            return ""
+        least, most = ratios[off].min(), ratios[off].max()
+        return f"lengths on the texture are {least:.3g} to {most:.3g} times those in space"
+
+    def notes(self) -> list[str]:
+        """What is odd about the file; see the base class."""
+        if not self.path:
+            return []
+        mesh, pins = self._mesh, self.sheet()[3]
+        said = list(mesh.notes)
+        if self.up == "auto" and level_openings(mesh.positions, mesh.elements) == "z":
+            said.append("z looks like its up axis, and y is taken; up=z takes z, up=y says y")
+        count, loose = parts(mesh.elements, pins)
+        if loose:
+            said.append(f"{loose} of its {count} parts have no pin and fall")
+        if len(pins) == len(mesh.positions):
+            said.append("all its vertices are pinned: nothing moves")
+        if twins := unsewn(mesh.positions):
+            said.append(f"{twins} vertices lie on others: the cloth is not joined there")
+        if edges := odd_edges(mesh.elements):
+            said.append(f"{edges} edges belong to more than two triangles, and bend by pairs")
+        if (
+            mesh.texture is not None
+            and self.rest != "flattened"
+            and (odd := self._off_pattern(CLOSE))
+        ):
+            said.append(f"{odd}; the texture is its rest shape")
+        return [f"{self.path}: {note}" for note in said]
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """Rest positions (e, 3, 2), triangles (e, 3), initial positions (n, 3), pins (p,)."""
@@ -97,7 +155,7 @@ class Garment(ClothScenario):
     def warm_up(self) -> None:
         """With the smallest skirt, whatever the mesh."""
         project: Callable[[FloatArray], FloatArray] = lambda target: target  # noqa: E731
-        next(replace(self, path="", rest="auto", scale=1.0, resolution=2).play(project))
+        next(replace(self, path="", rest="auto", up="auto", scale=1.0, resolution=2).play(project))
 
 
 def doubled_areas(corners: FloatArray) -> FloatArray:

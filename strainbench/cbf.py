@@ -31,9 +31,12 @@ def cbf_text(form: ConicForm, b: FloatArray, comments: Iterable[str]) -> str:
     Parameters
     ----------
     b : the frame's constants
-    comments : lines for the file's head
+    comments : for the file's head, a line each
     """
-    return "\n".join([*(f"# {line}" for line in comments), *_sections(form, b)]) + "\n"
+    return (
+        "\n".join([*(f"# {' '.join(line.split())}" for line in comments), *_sections(form, b)])
+        + "\n"
+    )
 
 
 def _sections(form: ConicForm, b: FloatArray) -> Lines:

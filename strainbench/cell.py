@@ -96,10 +96,19 @@ def content_of(source: str, settings: Iterable[object]) -> str:
 
 def _named_files(source: str, settings: Iterable[object]) -> list[Path]:
     """The files that settings name, as they stand or in the data folder beside a plug-in."""
-    words = [Path(v) for v in settings if isinstance(v, str | Path) and str(v)]
-    places = [(word, plugin_files(source)[0].parent / "data" / word) for word in words]
-    found = [next((file for file in place if _is_file(file)), None) for place in places]
-    return [file for file in found if file]
+    words = [str(v) for v in settings if isinstance(v, str | Path) and str(v)]
+    data = plugin_files(source)[0].parent / "data"
+    places = ((file_named(word), file_named(str(data / word))) for word in words)
+    return [found for place in places if (found := next(filter(None, place), None))]
+
+
+def file_named(word: str) -> Path | None:
+    """The file that a word names, ~ being the user's home, if there is one."""
+    try:
+        path = Path(word).expanduser()
+        return path if path.is_file() else None
+    except (OSError, RuntimeError, ValueError):  # too long, no such home, a null character
+        return None
 
 
 @dataclass(frozen=True)
@@ -146,13 +155,6 @@ class Cell:
     def title(self) -> str:
         """For the progress bar."""
         return f"{self.scenario.label}, {self.solver.label}"
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # too long for a name, or with a null character
-        return False
 
 
 def _digest(content: object) -> str:

@@ -6,10 +6,11 @@ import os
 import shlex
 import signal
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TextIO
 
 import psutil
 import typer
@@ -39,6 +40,7 @@ from strainbench.problem import Problem
 from strainbench.records import DiskError, open_folder
 from strainbench.reference import REFERENCE_SOLVER
 from strainbench.runner import Observer, Runner, Settings, Summary
+from strainbench.scenario import SceneWarning
 
 app = typer.Typer(
     add_completion=False,
@@ -712,6 +714,22 @@ def _terminate(*_: object) -> None:
     raise TerminatedError
 
 
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,  # noqa: ARG001
+    line: str | None = None,
+) -> None:
+    """What a scene says is one line; all else as Python has it."""
+    if issubclass(category, SceneWarning):
+        say(f"strainbench: note: {message}", errors)
+    else:
+        text = warnings.formatwarning(message, category, filename, lineno, line)
+        errors.print(text, markup=False)
+
+
 def main() -> None:
     """Run the command line; exit 2 for a wrong word, 1 for our own fault or the disk's.
 
@@ -728,7 +746,10 @@ def main() -> None:
 def _run() -> tuple[int, str]:
     """The exit status, and what there is to say of it."""
     try:
-        status = app(standalone_mode=False) or 0
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", SceneWarning)
+            warnings.showwarning = _show_warning
+            status = app(standalone_mode=False) or 0
     except typer.TyperException as error:
         message = getattr(error, "format_message", error.__str__)()
         return 2, f"{message} (strainbench --help lists what is valid)"

@@ -342,4 +342,5 @@ def _outcome(
     statuses = sorted({e["status"] for e in events if e["event"] == "projection"} - {"solved"})
     if statuses and outcome != "optimal":
         reasons.append("it says " + ", ".join(repr(s) for s in statuses[:3]))
+    reasons += [note for e in events if e["event"] == "loaded" for note in e["notes"]]
     return outcome, "; ".join(reasons)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, fields, replace
@@ -13,7 +15,7 @@ from typing import Any
 
 import psutil
 
-from strainbench.cell import Cell, PluginRef
+from strainbench.cell import Cell, PluginRef, file_named
 from strainbench.discovery import (
     Plugin,
     UnavailableError,
@@ -27,7 +29,7 @@ from strainbench.discovery import (
 from strainbench.fields import SETTABLE, NotSettableError, default_of, hints, read
 from strainbench.fields import words as words_of
 from strainbench.options import MOST, shown
-from strainbench.scenario import Scenario
+from strainbench.scenario import Scenario, SceneWarning
 from strainbench.solver import Solver, warm_twin
 
 MODES = ("simulate", "replay")
@@ -51,8 +53,23 @@ def parse_settings(words: Iterable[str]) -> Choices:
         owner, _, name = key.rpartition(".")
         if not equals or not name or not values:
             raise ValueError(f"--set {shown(word)}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
-        choices.setdefault(owner, {}).setdefault(name, []).extend(values.split(","))
+        choices.setdefault(owner, {}).setdefault(name, []).extend(split_values(values))
     return choices
+
+
+def split_values(text: str) -> list[str]:
+    """Values between commas; one in double quotes, or that is a file as it stands, keeps its own.
+
+    >>> split_values('"a,b.obj",c.obj')
+    ['a,b.obj', 'c.obj']
+    """
+    if "," in text and file_named(text):
+        return [text]
+    try:
+        return next(csv.reader([text], strict=True))
+    except csv.Error as error:
+        valid = 'V1,V2 or "V1,V2" for one value with a comma is valid'
+        raise ValueError(f"--set ...={shown(text)}: {valid} ({error})") from None
 
 
 def parse_value(owner: str, key: str, hint: Any, text: str, file: str = "") -> object:
@@ -115,7 +132,8 @@ def blaming(name: str, file: str | None) -> Iterator[None]:
 
 def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
     """The scenarios named, or given as files, with every combination of settings."""
-    refs = []
+    refs: list[PluginRef] = []
+    notes: list[str] = []
     for word in words:
         file = word if is_file(word) else None
         path = str(Path(word).resolve()) if file else None
@@ -126,6 +144,9 @@ def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
                     check_size(scene)
                     label = scene.labelled(spelling) if spelling else None
                     refs.append(PluginRef.of(scene, path, label))
+                    notes += scene.notes()
+    for note in dict.fromkeys(notes):
+        warnings.warn(note, SceneWarning, stacklevel=2)
     return refs
 
 

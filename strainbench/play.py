@@ -200,6 +200,7 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
         nonzeros=int(3 * problem.G.nnz),
         needs=", ".join(sorted(scenario.needs)),
         blas_threads=threads,
+        notes=scenario.notes(),
     )
     start_warming(journal)
     if refusal := solver.supports(problem):

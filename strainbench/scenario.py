@@ -29,6 +29,10 @@ EASY_LIMIT = 0.01  # tighter ones are checked on this one
 FEWEST_STEPS = 10  # of a run that is not told how many
 
 
+class SceneWarning(UserWarning):
+    """What a scene says of itself when it is planned; see `Scenario.notes`."""
+
+
 @dataclass(frozen=True)
 class StepReport:
     """What the physics of one time step cost, whether it converged, and where it left the cloth.
@@ -112,6 +116,10 @@ class Scenario(ABC):
     def easier(self) -> Scenario | None:
         """The neighbour on which a failure here is checked; None where this one is easy itself."""
         return replace(self, limit=EASY_LIMIT) if self.limit < EASY_LIMIT else None
+
+    def notes(self) -> list[str]:
+        """What a user should know of this scene, such as odd things in its files; a line each."""
+        return []
 
     @property
     def first_step(self) -> float:

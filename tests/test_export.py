@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from io import BytesIO
 from itertools import islice
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import clarabel
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from strainbench import Problem, StretchLimits, solve
+from strainbench import Problem, StretchLimits, certify, solve
 from strainbench.export import FORMATS, as_npz, load_problem, write_problem
 from strainbench.frame import record
 from strainbench.plan import plan_one
@@ -220,3 +222,130 @@ def test_a_file_that_is_no_exported_problem(tmp_path):
 @pytest.mark.parametrize("kind", FORMATS)
 def test_the_same_problem_gives_the_same_bytes(kind, swing):
     assert FORMATS[kind](swing, "twice") == FORMATS[kind](swing, "twice")
+
+
+# --- round trips, and files that are damaged or hostile
+
+
+def drawn(seed):
+    """A problem of each kind that there is: lower bounds, by element, seams, exact, masses."""
+    rng = np.random.default_rng(seed)
+    flat = random_problem(rng, exact=seed % 3 == 0, per_element=seed % 2 == 0, mass=seed % 4 > 1)
+    limits = flat.limits
+    if not limits.spectral and seed % 3 == 1:
+        limits = StretchLimits(limits.directions, limits.bounds, lower=0.9 * limits.bounds)
+    rest = flat.rest[flat.elements] if seed % 5 == 0 else flat.rest
+    return Problem(rest, flat.elements, flat.target, limits, flat.pinned, flat.mass), rng
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_is_loaded_is_judged_the_same(seed, tmp_path):
+    problem, rng = drawn(seed)
+    write_problem(problem, tmp_path / "a.npz", "npz", "a test")
+    again = load_problem(tmp_path / "a.npz")
+    x = problem.target + 0.3 * problem.edge_length * rng.normal(size=problem.target.shape)
+    assert again.convex == problem.convex
+    assert np.array_equal(again.violations(x), problem.violations(x))
+    assert again.objective(x) == problem.objective(x)
+    assert np.array_equal(again.pinned, problem.pinned)
+    assert np.array_equal(again.rest, problem.rest)
+    x[problem.pinned] = problem.target[problem.pinned]
+    if problem.convex:
+        one, two = certify(problem, x), certify(again, x)
+        assert (one.outcome, one.lower_bound) == (two.outcome, two.lower_bound)
+    write_problem(again, tmp_path / "b.npz", "npz", "a test")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.npz", "b.npz"]
+
+
+def test_cbf_refuses_lower_bounds(tmp_path):
+    problem = drawn(1)[0]
+    assert not problem.convex
+    with pytest.raises(ValueError, match=r"--format cbf: limits on compression .* npz is valid"):
+        write_problem(problem, tmp_path / "a.cbf", "cbf", "a test")
+    assert list(tmp_path.iterdir()) == []
+
+
+def members(path):
+    with ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def header(shape, dtype="<f8"):
+    stream = BytesIO()
+    facts = {"descr": dtype, "fortran_order": False, "shape": shape}
+    np.lib.format.write_array_header_1_0(stream, facts)
+    return stream.getvalue()
+
+
+def saved(array):
+    stream = BytesIO()
+    np.save(stream, array, allow_pickle=True)
+    return stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("target", header((10**12,)) + bytes(8)),
+        ("target", header((-1, 3))),
+        ("target", header((10**12, 3), "|O")),
+        ("target", b"junk"),
+        ("target", saved(np.full((4, 3), np.nan))),
+        ("target", saved(np.array(["a"]))),
+        ("target", saved(np.array([None]))),
+        ("elements", saved(np.zeros((2, 3)))),
+        ("elements", saved(np.full((2, 3), 99999))),
+        ("limit_spectral", saved(np.array("False"))),
+        ("limit_lower", saved(np.array(2.0))),
+        ("pinned", None),
+    ],
+)
+def test_a_hostile_array_is_one_line(tmp_path, name, content):
+    path = tmp_path / "a.npz"
+    write_problem(drawn(2)[0], path, "npz", "a test")
+    parts = members(path)
+    with ZipFile(path, "w") as archive:
+        for member, data in parts.items():
+            if member != f"{name}.npy":
+                archive.writestr(member, data)
+        if content is not None:
+            archive.writestr(f"{name}.npy", content)
+    with pytest.raises(ValueError, match=r"a\.npz holds no exported problem") as error:
+        load_problem(path)
+    assert "\n" not in str(error.value)
+
+
+def test_an_archive_that_claims_more_than_it_holds(tmp_path):
+    path = tmp_path / "a.npz"
+    write_problem(drawn(2)[0], path, "npz", "a test")
+    parts = members(path)
+    huge = 8 * 10**8
+    with ZipFile(path, "w", ZIP_DEFLATED) as archive:
+        for member, data in parts.items():
+            archive.writestr(member, data)
+    with ZipFile(path) as archive:
+        info = next(i for i in archive.infolist() if i.filename == "target.npy")
+        old = info.file_size.to_bytes(4, "little")
+    path.write_bytes(path.read_bytes().replace(old, huge.to_bytes(4, "little")))
+    with pytest.raises(ValueError, match=r"a\.npz"):
+        load_problem(path)
+
+
+def test_a_file_cut_or_changed_anywhere_is_one_line_or_the_problem(tmp_path):
+    problem, rng = drawn(2)
+    path = tmp_path / "a.npz"
+    write_problem(problem, path, "npz", "a test")
+    content = path.read_bytes()
+    for _ in range(60):
+        at = int(rng.integers(len(content)))
+        cut = bytes([content[at] ^ int(rng.integers(1, 256))])
+        for damaged in (content[:at], content[:at] + cut + content[at + 1 :]):
+            path.write_bytes(damaged)
+            try:
+                again = load_problem(path)
+            except ValueError as error:
+                assert "a.npz" in str(error)  # noqa: PT017
+                assert "\n" not in str(error)  # noqa: PT017
+            else:
+                assert content_key(again) == content_key(problem)

@@ -184,15 +184,48 @@ def test_csv_columns_are_found_by_name(tmp_path):
         ("angle_degrees,bound\n", r"curve\.csv: no samples"),
         ("angle_degrees,bound\n0,1.1\n90,wide\n", r"curve\.csv, line 3: .*wide"),
         ("angle_degrees,bound\n0\n", r"curve\.csv, line 2: "),
-        ("angle_degrees,bound\n0,1.1\n90,nan\n", r"limits\.bounds\[1\] is nan"),
-        ("angle_degrees,bound\n0,1.1\n90,-1\n", r"limits\.bounds\[1\] is -1"),
-        ("angle_degrees,bound\ninf,1.1\n", r"limits\.\w+\[0\] is inf"),
+        ("angle_degrees,bound\n0,1.1\n90,nan\n", r"line 3: .*nan is not finite"),
+        ("angle_degrees,bound\n0,1.1\n90,-1\n", r"line 3: .*-1 is no stretch"),
+        ("angle_degrees,bound\ninf,1.1\n", r"line 2: .*inf is not finite"),
+        ("angle_degrees,bound\n0,1,05\n", r"line 2: .*3 values for 2 columns"),
+        ("angle_degrees,bound,bound\n0,1.1,1.2\n", r"columns .*once each"),
+        ("angle_degrees,bound,strain\n0,1.1,0.1\n", r"columns .*once each"),
+        ("angle_degrees,bound\n0,1.05\n45,0.05\n", r"line 3: .*0\.05 is no stretch.*strain"),
+        ("angle_degrees,bound\n0,5\n", r"line 2: .*5 is no stretch.*percent"),
+        ("angle_degrees,bound\n0,\n", r"line 2: .*'' is not a number"),
+        ("angle_degrees,bound\n-90,1.1\n0,1.1\n90,1.2\n", r"line 4: .*another bound above, 1\.1"),
+        ("angle_degrees,bound\n0,1.1\n1.5708,1.2\n", r"are radians"),
     ],
 )
 def test_a_wrong_csv_is_one_clear_line(tmp_path, text, words):
     with pytest.raises(ValueError, match=words) as caught:
         StretchLimits.from_csv(write(tmp_path, text))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"\xef\xbb\xbfangle_degrees,bound\n0,1.05\n90,1.5\n",
+        "angle_degrees\tbound\n0\t1,05\n90\t1.5\n".encode("utf-16"),
+        b"angle_degrees;bound\r\n0;1,05\r\n\r\n90;1,5\r\n",
+        b"angle_degrees , strain\n0,0.05\n90,0.5\n",
+        b"angle_degrees,percent\n0,5\n90,50\n",
+        b"angle_radians,bound\n0,1.05\n1.5707963267948966,1.5\n",
+        b"angle_degrees,bound,who\n0,1.05,Caf\xe9\n90,1.5,\n",
+    ],
+)
+def test_what_people_write_is_read_right(tmp_path, content):
+    (tmp_path / "curve.csv").write_bytes(content)
+    limits = StretchLimits.from_csv(tmp_path / "curve.csv")
+    np.testing.assert_allclose(limits.bounds, [1.05, 1.5], rtol=1e-14)
+    np.testing.assert_allclose(limits.directions, np.eye(2), atol=1e-15)
+
+
+@pytest.mark.parametrize("name", [".", "nowhere.csv"])
+def test_a_curve_that_is_no_file_is_one_line(tmp_path, name):
+    with pytest.raises(ValueError, match="no such file"):
+        StretchLimits.from_csv(tmp_path / name)
 
 
 # --- bad input names the field, the index and the value

@@ -9,7 +9,8 @@ import pytest
 
 from strainbench.cell import Cell, PluginRef
 from strainbench.discovery import find_scenario, find_solver
-from strainbench.plan import never_warm, parse_settings, parse_value, plan
+from strainbench.plan import never_warm, parse_settings, parse_value, plan, split_values
+from strainbench.scenario import SceneWarning
 
 SOLVER = '''
 from dataclasses import dataclass
@@ -56,6 +57,57 @@ def test_settings_are_sorted_by_owner_and_key():
         "": {"resolution": ["10", "20", "40"], "limit": ["1%"]},
         "clarabel": {"form": ["paper"]},
     }
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("1%,2%", ["1%", "2%"]),
+        ('"a,b.obj"', ["a,b.obj"]),
+        ('"a, b.obj",c d.obj', ["a, b.obj", "c d.obj"]),
+        ('"say ""x"".obj"', ['say "x".obj']),
+        ('5" wide.obj', ['5" wide.obj']),
+    ],
+)
+def test_values_lie_between_commas_but_for_those_in_quotes(text, values):
+    assert split_values(text) == values
+
+
+@pytest.mark.parametrize("text", ['"a,b', '"a"b,c', "a\nb"])
+def test_a_quote_that_does_not_end_is_one_line(text):
+    with pytest.raises(ValueError, match=r'"V1,V2" for one value with a comma is valid') as error:
+        parse_settings([f"path={text}"])
+    assert "\n" not in str(error.value)
+
+
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.mark.parametrize("name", ["a,b.obj", "a b.obj", "[x].obj", "café, 1%.obj"])
+def test_a_file_is_one_value_whatever_its_name(tmp_path, name):
+    path = tmp_path / name
+    path.write_text(TRIANGLE)
+    (cell,) = cells(["garment"], settings=[f"path={path}"])
+    assert parameters(cell.scenario)["path"] == str(path)
+    (other,) = cells(["garment"], settings=[f'path="{path}"'])
+    assert other.key == cell.key
+
+
+def test_the_home_folder_is_found_and_its_file_part_of_the_cell(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (tmp_path / "a,b.obj").write_text(TRIANGLE)
+    (tmp_path / "c.csv").write_text("angle_degrees,bound\n0,1.1\n90,1.2\n")
+    (cell,) = cells(["garment"], settings=["path=~/a,b.obj"])
+    assert cell.scenario.content
+    assert cell.key == cells(["garment"], settings=[f"path={tmp_path}/a,b.obj"])[0].key
+    assert cells(["chainmail"], settings=["curve_file=~/c.csv"])[0].scenario.content
+
+
+def test_what_a_scene_says_of_its_files_is_said_when_it_is_planned(tmp_path):
+    (tmp_path / "two.obj").write_text(TRIANGLE + "f 3 2 1\n")
+    with pytest.warns(SceneWarning, match=r"two\.obj: 1 of 2 faces that repeat") as said:
+        cells(["garment"], ["none", "clarabel"], settings=[f"path={tmp_path}/two.obj"])
+    assert len(said) == 1
 
 
 def test_an_owner_may_have_hyphens_and_a_value_an_equals_sign():
