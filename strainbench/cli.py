@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Annotated, TextIO
 
@@ -737,6 +738,9 @@ def main() -> None:
     ours shows where it is.
     """
     signal.signal(signal.SIGTERM, _terminate)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # what a locale lacks is shown as a question mark
+            stream.reconfigure(errors="replace")
     status, line = _run()
     if line:
         say(f"strainbench: {line}", errors)

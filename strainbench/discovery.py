@@ -83,7 +83,7 @@ def _summary(package: str, stem: str) -> tuple[str, str]:
     path = (
         folder / f"{stem}.py" if (folder / f"{stem}.py").exists() else folder / stem / "__init__.py"
     )
-    return method_and_paper(ast.get_docstring(ast.parse(path.read_text())))
+    return method_and_paper(ast.get_docstring(ast.parse(path.read_bytes())))
 
 
 def _variants(solver: type[Solver]) -> Iterator[Solver]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
+
 import pytest
 
-from strainbench.sources import ROOT, SUITE, closure, digest
+from strainbench.sources import PACKAGES, ROOT, SUITE, closure, digest
 
 
 @pytest.fixture
@@ -82,3 +84,18 @@ def test_a_digest_follows_the_contents_and_not_the_place(write):
     two.write_text("a = 2")
     assert digest([one]) != digest([two])
     assert digest([one, two]) == digest([two, one])
+
+
+def test_no_file_of_ours_depends_on_the_locale():
+    """Text is opened as UTF-8, said so at each place."""
+    for package in PACKAGES:
+        for file in (ROOT / package).rglob("*.py"):
+            for call in ast.walk(ast.parse(file.read_bytes())):
+                if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute | ast.Name):
+                    name = call.func.attr if isinstance(call.func, ast.Attribute) else call.func.id
+                    binary = any("b" in str(getattr(a, "value", "")) for a in call.args)
+                    text = name in ("read_text", "write_text") or (
+                        name == "open" and isinstance(call.func, ast.Name) and not binary
+                    )
+                    said = "encoding" in {k.arg for k in call.keywords}
+                    assert said or not text, f"{file}, line {call.lineno}"

@@ -39,7 +39,7 @@ def write_page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    drawings = [c.read_text() for c in charts if c.suffix == ".svg"]
+    drawings = [c.read_text(encoding="utf-8") for c in charts if c.suffix == ".svg"]
     page = environment.get_template("page.html").render(
         charts=[Markup(svg[svg.index("<svg") :]) for svg in drawings],
         explanation=explanation(runs).replace("`", "").replace("**", ""),
