@@ -51,6 +51,8 @@ def kkt_residual(problem: Problem, positions: FloatArray) -> float:
     root = np.sqrt(problem.weights[movable, None])
     force = (root * (positions - problem.target)[movable]).T.ravel()
     scale = max(float(np.linalg.norm(force)), float(np.sqrt(2 * objective_floor(problem))))
+    if scale == 0:  # the floor of tiny problems underflows
+        return 0.0
     normals = _active_normals(problem, positions, movable)
     if normals.shape[1] == 0:
         return float(np.linalg.norm(force)) / scale

@@ -35,6 +35,8 @@ def infeasible_multipliers(
     projection : onto limits wider by a width, yields the error of each iterate, below 1 in the end
         where all went well, and its multipliers
     """
+    if not violation > 0:  # some positions are within the limits
+        return None
     low, high, width = 0.0, 2 * violation, 2 * violation
     for _ in range(HALVINGS):
         error = float("inf")
