@@ -20,7 +20,7 @@ WARM_UP_LIMIT = 20.0  # [s] at least, compilation apart; the time limit where th
 GRACE = 2.0  # [s] after the time limit in which a solver may stop by itself
 EXIT_GRACE = 2.0  # [s] from a cell's last word to the end of its process
 FAMILY_SECONDS = 0.25  # [s] between two looks at the memory of what a cell has started
-CLOCK_SLACK = 1.0  # [s] by which a line of a journal may come late on a busy machine
+CLOCK_SLACK = 3.0  # [s] by which a line of a journal may come late on a busy machine
 TAMPERED = "the clock was tampered with"
 
 
