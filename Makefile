@@ -53,7 +53,7 @@ directions: setup ## what sampled directions cost, and how far the true stretch 
 	$(BIN)/strainbench report --results $(DIRECTIONS)
 
 certificates: setup ## 200 random problems with all solvers: no certificate contradicted; an hour
-	$(BIN)/python -m pytest -q tests/test_certificates.py --problems 200
+	$(BIN)/python -m pytest -q tests/referee/test_certificates.py --problems 200
 
 test: setup ## the tests
 	$(TESTS)

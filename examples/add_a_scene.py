@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from strainbench import solve
-from strainbench.scenario import SheetScenario, StepReport
+from strainbench import SheetScenario, StepReport, solve
 
 LENGTH, STEP = 1.0, 1 / 60  # [m], [s]
 Array = NDArray[np.float64]

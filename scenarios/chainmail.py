@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from strainbench.limits import FloatArray, StretchLimits
-from strainbench.mesh import square_grid
-from strainbench.problem import IntArray
-from strainbench.scenario import ClothScenario
+from strainbench.problem.grid import square_grid
+from strainbench.problem.limits import FloatArray, StretchLimits
+from strainbench.problem.problem import IntArray
+from strainbench.scenario.scenario import ClothScenario
 
 SIDE = 0.5  # [m]
 

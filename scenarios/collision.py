@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from strainbench.limits import FloatArray
-from strainbench.mesh import square_grid
-from strainbench.physics.contact import Contact, Floor, Sphere
-from strainbench.problem import IntArray
-from strainbench.scenario import ClothScenario
+from strainbench.physics.energies.contact import Contact, Floor, Sphere
+from strainbench.problem.grid import square_grid
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray
+from strainbench.scenario.scenario import ClothScenario
 
 SIDE = 0.5  # [m]
 SPHERE = Sphere((0.25, -0.15, 0.30), 0.1)

@@ -10,14 +10,14 @@ from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 from scipy.special import j0
 
-from strainbench.limits import FloatArray, StretchLimits
-from strainbench.mesh import square_grid
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.equilibrium import BarrierSettings, equilibrium
 from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.statics import Equilibrium, StaticsSettings, constrained_minimum
-from strainbench.problem import IntArray, Problem
-from strainbench.scenario import Scenario, StepReport
+from strainbench.problem.grid import square_grid
+from strainbench.problem.limits import FloatArray, StretchLimits
+from strainbench.problem.problem import IntArray, Problem
+from strainbench.scenario.scenario import Scenario, StepReport
 
 SIDE = 0.5  # [m]
 SAMPLES = {"isotropic": 4, "orthotropic": 8, "anisotropic": 18}

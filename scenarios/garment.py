@@ -10,11 +10,17 @@ from pathlib import Path
 
 import numpy as np
 
-from strainbench.limits import FloatArray
-from strainbench.meshcheck import level_openings, odd_edges, parts, pattern_stretches, unsewn
-from strainbench.meshfile import MeshFile, flattened, read_mesh
-from strainbench.problem import IntArray
-from strainbench.scenario import ClothScenario
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray
+from strainbench.scenario.meshcheck import (
+    level_openings,
+    odd_edges,
+    parts,
+    pattern_stretches,
+    unsewn,
+)
+from strainbench.scenario.meshfile import MeshFile, flattened, read_mesh
+from strainbench.scenario.scenario import ClothScenario
 
 DATA = Path(__file__).parent / "data"
 WAIST, HEM, SLANT = 0.10, 0.25, 0.40

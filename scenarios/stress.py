@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from strainbench.limits import FloatArray
-from strainbench.mesh import square_grid
-from strainbench.problem import IntArray
-from strainbench.scenario import Scenario, SheetScenario, StepReport
+from strainbench.problem.grid import square_grid
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray
+from strainbench.scenario.scenario import Scenario, SheetScenario, StepReport
 
 SIDE = 0.5  # [m]
 CASES = ("slivers", "mass-ratio", "displaced", "fast-pins")

@@ -32,9 +32,9 @@ import numpy as np
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
-from strainbench.reference import objective_floor
-from strainbench.warm import Memory
+from strainbench.problem.limits import FloatArray
+from strainbench.referee.reference import objective_floor
+from strainbench.solver.memory import Memory
 
 DECREASE, HALVINGS = 1e-4, 20
 """Armijo's condition with its customary factor (Nocedal and Wright 2006, Sec. 3.1)."""

@@ -11,9 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.conic import ConicForm
-from strainbench.limits import FloatArray
-from strainbench.reference import objective_floor
+from strainbench.problem.conic import ConicForm
+from strainbench.problem.limits import FloatArray
+from strainbench.referee.reference import objective_floor
 
 CONES = {
     "second-order": clarabel.SecondOrderConeT,
@@ -29,7 +29,7 @@ class Clarabel(Solver):
 
     form="quadratic": minimise s/2 u'Mu subject to (b_i, (G target)_i + (G u)_i) in Q^4, the
         quadratic objective given as such. Equal to Eq. 12 but for the cone of the objective.
-        Exact limits have a semidefinite cone an element: see `strainbench.conic`.
+        Exact limits have a semidefinite cone an element: see `strainbench.problem.conic`.
     form="paper": Eq. 12 literally, with t_0, t_i, y_i and rotated cones. Clarabel has no
         rotated cone: (u, v, y) in Q_r iff (u + v, u - v, sqrt(2) y) in Q.
 

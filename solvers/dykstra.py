@@ -39,9 +39,9 @@ import numpy as np
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
-from strainbench.reference import objective_floor
-from strainbench.warm import Memory
+from strainbench.problem.limits import FloatArray
+from strainbench.referee.reference import objective_floor
+from strainbench.solver.memory import Memory
 
 ROWS_A_CHUNK = 1_000_000
 """Row visits between two looks at the clock: 30 ms at the 30 ns a visit measured."""

@@ -19,10 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.limits import FloatArray
-from strainbench.problem import IntArray
-from strainbench.solver import held_still
-from strainbench.warm import Memory
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray
+from strainbench.solver.memory import Memory
+from strainbench.solver.solver import held_still
 
 STATUS = {
     0: "solved",

@@ -6,7 +6,8 @@ not stretch. Only that set is theirs; their solver, a relaxed active-set iterati
     minimise s/2 ||x - target||_M^2  such that  l L_ij <= |x_i - x_j| <= b_ij  for every edge,
 
 with rest lengths L_ij, and b_ij the largest length that the problem's limits leave the edge
-(`strainbench.problem.longest_edges`): b L_ij where the edge lies along a direction of bound b.
+(`strainbench.problem.problem.longest_edges`): b L_ij where the edge lies along a direction of
+bound b.
 
 It is another feasible set. Every point within the limits is in it, but three lengths say nothing
 of the stretch in other directions: the triangle of a right-angled cell that is sheared along its
@@ -23,8 +24,8 @@ import numpy as np
 
 from solvers.ipopt import Ipopt, Rows, Structure
 from strainbench import Clock, Problem, Solution, StretchLimits
-from strainbench.problem import longest_edges
-from strainbench.warm import Memory
+from strainbench.problem.problem import longest_edges
+from strainbench.solver.memory import Memory
 
 
 @dataclass(frozen=True)

@@ -31,10 +31,10 @@ import osqp
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.limits import FloatArray
-from strainbench.reference import objective_floor, verify
-from strainbench.solver import held_still
-from strainbench.warm import Memory
+from strainbench.problem.limits import FloatArray
+from strainbench.referee.reference import objective_floor, verify
+from strainbench.solver.memory import Memory
+from strainbench.solver.solver import held_still
 
 ITERATIONS = 1000
 RHO = 100.0

@@ -15,27 +15,28 @@ import qoco
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.conic import ConicForm
-from strainbench.solver import held_still
+from strainbench.problem.conic import ConicForm
+from strainbench.solver.solver import held_still
 
 
 @dataclass(frozen=True)
 class Qoco(Solver):
     """Interior-point second-order cone programming (Tang et al. 2022, Eq. 12; QOCO).
 
-    What `clarabel` solves, see `strainbench.conic`. Called without cvxpy it takes as long or less
-    (0.6 to 1 of the time), and its last iterate is kept where it ends with a numerical error, which
-    cvxpy takes for no answer: close to a gap of 1e-6 its linear systems get too ill-conditioned to
-    go on. It has no warm start, looks at no clock and does not detect that limits cannot be met. It
-    is set up anew for each projection, a twentieth of the time: with constants updated instead
-    (version 0.3.2), runs that end as QOCO_SOLVED_INACCURATE take the same iterations to an answer
-    that is wrong, by up to a quarter of an edge with the fast pins of `stress`.
+    What `clarabel` solves, see `strainbench.problem.conic`. Called without cvxpy it takes as long
+    or less (0.6 to 1 of the time), and its last iterate is kept where it ends with a numerical
+    error, which cvxpy takes for no answer: close to a gap of 1e-6 its linear systems get too
+    ill-conditioned to go on. It has no warm start, looks at no clock and does not detect that
+    limits cannot be met. It is set up anew for each projection, a twentieth of the time: with
+    constants updated instead (version 0.3.2), runs that end as QOCO_SOLVED_INACCURATE take the same
+    iterations to an answer that is wrong, by up to a quarter of an edge with the fast pins of
+    `stress`.
 
     Its iterations depend on the order of vertices and on the frame of reference, which change
     nothing in the problem. On projection 16 of the swing at 20 cells, 1%, six orders took 23 to 78
     and four rotations 47 to 200, its limit; on projection 6, 25 to 27 and 54 to 200. All end as
-    QOCO_SOLVED_INACCURATE, within a gap of 1e-6. `tests/test_qoco.py` has a sheet of 10 cells on
-    which it is so, and newton-ipm's iterations do not change.
+    QOCO_SOLVED_INACCURATE, within a gap of 1e-6. `tests/solvers/test_qoco.py` has a sheet of 10
+    cells on which it is so, and newton-ipm's iterations do not change.
 
     Parameters
     ----------

@@ -36,8 +36,8 @@ import numpy as np
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
-from strainbench.warm import Memory
+from strainbench.problem.limits import FloatArray
+from strainbench.solver.memory import Memory
 
 ROWS_A_CHUNK = 3_000_000
 """Row visits between two looks at the clock: 30 ms at the 10 ns a visit measured."""

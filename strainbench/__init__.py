@@ -1,21 +1,33 @@
-"""strainbench: a benchmarking suite for strain-limiting solvers in cloth simulation."""
+"""strainbench: a benchmarking suite for strain-limiting solvers in cloth simulation.
+
+What is imported from here stays here, wherever the modules behind it lie.
+"""
 
 from strainbench.api import solve
-from strainbench.limits import StretchLimits
-from strainbench.problem import Problem
-from strainbench.referee import Certificate, certify
-from strainbench.scenario import Scenario
-from strainbench.solver import Clock, Solution, Solver
+from strainbench.problem.grid import square_grid
+from strainbench.problem.limits import FloatArray, StretchLimits
+from strainbench.problem.problem import IntArray, Problem
+from strainbench.referee.certificate import Certificate, certify
+from strainbench.scenario.scenario import ClothScenario, Scenario, SheetScenario, StepReport
+from strainbench.solver.memory import Memory
+from strainbench.solver.solver import Clock, Solution, Solver
 
 __version__ = "0.1.0"
 __all__ = [
     "Certificate",
     "Clock",
+    "ClothScenario",
+    "FloatArray",
+    "IntArray",
+    "Memory",
     "Problem",
     "Scenario",
+    "SheetScenario",
     "Solution",
     "Solver",
+    "StepReport",
     "StretchLimits",
     "certify",
     "solve",
+    "square_grid",
 ]

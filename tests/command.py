@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 
-from strainbench import cli
+from strainbench.cli import app as cli
 
 
 @dataclass(frozen=True)

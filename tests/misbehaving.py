@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-import strainbench.play
-import strainbench.solver
+import strainbench.bench.play
+import strainbench.solver.solver
 from strainbench import Solution, Solver
 
 IN_CELL = "STRAINBENCH_MARK" in os.environ  # and not where the run is planned
@@ -613,7 +613,7 @@ class StopsClock(Harmless, Solver):
     name = "stops-clock"
 
     def misbehave(self):
-        strainbench.solver.perf_counter = lambda: 0.0
+        strainbench.solver.solver.perf_counter = lambda: 0.0
         time.perf_counter = time.monotonic = time.time = lambda: 0.0
 
 
@@ -624,12 +624,12 @@ class SlowClock(Harmless, Solver):
     name = "slow-clock"
 
     def solve(self, problem, state, *, tolerance, monitor, deadline):
-        write = strainbench.play.Journal.write
+        write = strainbench.bench.play.Journal.write
 
         def late(journal, event, **facts):
             write(journal, event, **facts | {"at": 0.0})
 
-        strainbench.play.Journal.write = late
+        strainbench.bench.play.Journal.write = late
         return Solution(problem.target.copy(), "solved", 0)
 
 
@@ -640,7 +640,7 @@ class FalseClaim(Harmless, Solver):
     name = "false-claim"
 
     def solve(self, problem, state, *, tolerance, monitor, deadline):
-        run = strainbench.solver.run_solver
-        strainbench.play.run_solver = lambda *args: replace(run(*args), seconds=0.0)
+        run = strainbench.solver.solver.run_solver
+        strainbench.bench.play.run_solver = lambda *args: replace(run(*args), seconds=0.0)
         time.sleep(0.3)
         return Solution(problem.target.copy(), "solved", 0)

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from strainbench import Problem, StretchLimits
-from strainbench.mesh import square_grid
-from strainbench.reference import verify
+from strainbench.problem.grid import square_grid
+from strainbench.referee.reference import verify
 
 
 def rotation(rng, dim=3):

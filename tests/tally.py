@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from strainbench.referee import OUTCOMES, Certificate
+from strainbench.referee.certificate import OUTCOMES, Certificate
 
 BROKEN = "solved, but violated"
 COLUMNS = (*OUTCOMES, BROKEN, "refused")

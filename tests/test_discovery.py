@@ -9,7 +9,8 @@ import pytest
 
 import solvers
 from strainbench import Scenario, Solver
-from strainbench.discovery import (
+from strainbench.bench.plan import plan_solvers
+from strainbench.plugins import (
     UnavailableError,
     find_scenario,
     find_solver,
@@ -17,7 +18,6 @@ from strainbench.discovery import (
     list_solvers,
     load_file,
 )
-from strainbench.plan import plan_solvers
 
 HEAD = """
 from dataclasses import dataclass

@@ -91,10 +91,11 @@ def test_a_heading_in_a_code_block_is_none(tool, tmp_path, monkeypatch):
 def test_links_between_files_become_links_between_pages(tool):
     hooks = tool("hooks")
     text = (
-        "[a](strainbench/kkt.py) [b](results/README.md#newton-ipm) [c](https://x.org) [d](LICENSE)"
+        "[a](strainbench/referee/kkt.py) [b](results/README.md#newton-ipm) "
+        "[c](https://x.org) [d](LICENSE)"
     )
     assert hooks.relinked(text, ".", "methods/index.md") == (
-        "[a](../reference/kkt.md) [b](../results/README.md#newton-ipm) [c](https://x.org) "
+        "[a](../reference/referee.md) [b](../results/README.md#newton-ipm) [c](https://x.org) "
         "[d](../LICENSE)"
     )
     assert hooks.relinked("[e](swing-short/table1.md)", "results", "results/README.md") == (

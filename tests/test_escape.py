@@ -20,12 +20,12 @@ from rich.console import Console
 from rich.table import Table
 
 from strainbench import escape
-from strainbench.duel import Entry
-from strainbench.ledger import Row
-from strainbench.ledger import as_markdown as ledger_markdown
-from strainbench.plan import plan
-from strainbench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows
-from strainbench.report.duel import Outcome
+from strainbench.bench.plan import plan
+from strainbench.bench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows
+from strainbench.studies.duel.measure import Entry
+from strainbench.studies.duel.report import Outcome
+from strainbench.studies.ledger import Row
+from strainbench.studies.ledger import as_markdown as ledger_markdown
 from tests.command import command
 
 NASTY = (
@@ -271,7 +271,7 @@ PLUGIN = """
 from dataclasses import dataclass
 
 from strainbench import Solution, Solver
-from strainbench.scenario import Scenario
+from strainbench.scenario.scenario import Scenario
 from scenarios.stretch_square import StretchSquare
 
 TEXT = {text!r}

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strainbench import Problem, StretchLimits, certify, solve
-from strainbench.discovery import UnavailableError, find_scenario, find_solver, list_solvers
-from strainbench.reference import reference_of
-from strainbench.solver import run_solver, warm_twin
+from strainbench.plugins import UnavailableError, find_scenario, find_solver, list_solvers
+from strainbench.referee.reference import reference_of
+from strainbench.solver.solver import run_solver, warm_twin
 from tests.problems import random_problem
 
 NAMES = [e.name for e in list_solvers() if not e.unavailable]

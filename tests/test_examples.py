@@ -81,7 +81,7 @@ def test_an_example_is_short_and_stays_on_public_ground(path):
     lines = path.read_text().split('"""', 2)[2].splitlines()
     assert len([line for line in lines if line.strip()]) <= 40
     ours = [line.split()[1] for line in lines if line.startswith("from strainbench")]
-    assert set(ours) <= {"strainbench", "strainbench.scenario", "strainbench.export"}
+    assert set(ours) <= {"strainbench", "strainbench.export"}
 
 
 def test_there_are_six():

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from strainbench.discovery import list_scenarios, list_solvers
-from strainbench.listing import described, found, tables
-from strainbench.plan import parse_value, plan
+from strainbench.bench.plan import parse_value, plan
+from strainbench.cli.listing import described, found, tables
+from strainbench.plugins import list_scenarios, list_solvers
 from tests.command import command
 
 ODD = '''

@@ -41,7 +41,7 @@ def test_rooms_keep_the_order_that_pyproject_declares():
 def test_an_import_upwards_a_circle_and_a_new_room_are_found(copy):
     below = layers()[-1]
     low = next(path for room in below for path in files(copy, room) if path.exists())
-    low.write_text(low.read_text() + "\nimport strainbench.cli\n")
+    low.write_text(low.read_text() + "\nimport strainbench.cli.app\n")
     (copy / "strainbench/drawer.py").touch()
     done = lint(copy)
     assert done.returncode == 1

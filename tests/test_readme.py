@@ -61,7 +61,7 @@ def test_example_solver_is_short_and_honest(tmp_path):
     import numpy as np
 
     from strainbench import Solver, certify, solve
-    from strainbench.discovery import load_file
+    from strainbench.plugins import load_file
     from tests.problems import random_problem
 
     (solver,) = load_file(str(path), Solver)

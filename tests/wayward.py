@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from strainbench.mesh import square_grid
-from strainbench.scenario import SheetScenario, StepReport
+from strainbench.problem.grid import square_grid
+from strainbench.scenario.scenario import SheetScenario, StepReport
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class Wayward(SheetScenario):
         return rest, elements, positions, np.array([0])
 
     def problem(self):
-        if "strainbench.judge" in sys.modules:  # not in a cell's process
+        if "strainbench.bench.judge" in sys.modules:  # not in a cell's process
             MISDEEDS[self.how]()
         return super().problem()
 

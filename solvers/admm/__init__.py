@@ -30,10 +30,10 @@ import numpy as np
 from solvers.admm.anderson import Anderson
 from solvers.admm.rows import Rows
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.limits import FloatArray
-from strainbench.reference import objective_floor
-from strainbench.solver import held_still
-from strainbench.warm import Memory
+from strainbench.problem.limits import FloatArray
+from strainbench.referee.reference import objective_floor
+from strainbench.solver.memory import Memory
+from strainbench.solver.solver import held_still
 
 LOOK = 10
 """Iterations between two tests for the end, each as dear as half an iteration."""

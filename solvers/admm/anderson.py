@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from strainbench.limits import FloatArray
+from strainbench.problem.limits import FloatArray
 
 
 class Anderson:

@@ -7,8 +7,8 @@ import scipy.sparse as sp
 
 from strainbench import Problem
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
 from strainbench.physics.linear import SuperLU
+from strainbench.problem.limits import FloatArray
 
 
 class Rows:

@@ -17,7 +17,7 @@ from solvers.cvxpy.backends import (
 )
 from solvers.cvxpy.model import Model
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.solver import held_still
+from strainbench.solver.solver import held_still
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from solvers.gauss_seidel.elements import Elements, refusal
 from solvers.gauss_seidel.rows import Rows
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.warm import Memory
+from strainbench.solver.memory import Memory
 
 VISITS_A_CHUNK = 3_000_000
 """Constraint visits between two looks at the clock: 20 ms at the 6 to 7 ns a row measured."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from strainbench import Problem
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
+from strainbench.problem.limits import FloatArray
 
 NO_LEVERAGE = 1e-12
 """Coefficients smaller than this beside the row's largest are rounding, and move nothing."""

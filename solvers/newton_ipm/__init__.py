@@ -69,9 +69,9 @@ from solvers.newton_ipm.infeasible import infeasible_multipliers
 from solvers.newton_ipm.iterate import STRICTER, Iterate, State
 from solvers.newton_ipm.sampled import ROUNDING
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.limits import FloatArray
 from strainbench.physics.linear import NotPositiveDefiniteError
-from strainbench.reference import objective_floor, verify
+from strainbench.problem.limits import FloatArray
+from strainbench.referee.reference import objective_floor, verify
 
 PATIENCE = 25  # iterations after which a warm start is given up
 WIDTHS = 2e-8, 1e-10, 1e-12, 1e-13  # of wider limits; below, slacks are rounding

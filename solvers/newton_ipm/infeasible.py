@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from strainbench import Problem
-from strainbench.limits import FloatArray
-from strainbench.reference import verify
+from strainbench.problem.limits import FloatArray
+from strainbench.referee.reference import verify
 
 HALVINGS = 20
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
+from strainbench.problem.limits import FloatArray
 
 
 @dataclass(frozen=True)

@@ -31,13 +31,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.linear import NotPositiveDefiniteError
 from strainbench.physics.pattern import scatter
 from strainbench.physics.statics import Equilibrium, potential
-from strainbench.problem import IntArray, Problem
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray, Problem
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench.compiled import compiled
-from strainbench.limits import FloatArray
-from strainbench.problem import IntArray
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray
 
 
 @dataclass(frozen=True, eq=False)

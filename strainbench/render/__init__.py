@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from PIL import Image
 
+from strainbench.bench.plan import plan_one
+from strainbench.bench.records import open_folder
 from strainbench.options import shown
-from strainbench.plan import plan_one
-from strainbench.records import open_folder
 from strainbench.render.animation import write_gif, write_mp4
 from strainbench.render.export import MESH_FORMATS, write_meshes
 from strainbench.render.film import (

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from strainbench.cell import Cell
-from strainbench.limits import FloatArray
-from strainbench.physics.contact import Obstacle
-from strainbench.problem import Problem
-from strainbench.scenario import ClothScenario
-from strainbench.solver import Solver, run_solver
+from strainbench.bench.cell import Cell
+from strainbench.physics.energies.contact import Obstacle
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import Problem
+from strainbench.scenario.scenario import ClothScenario
+from strainbench.solver.solver import Solver, run_solver
 
 Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
 """(items, what they are, how many) to the same items, with a progress bar beside them."""

@@ -21,8 +21,8 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from strainbench.escape import chart
-from strainbench.limits import FloatArray
-from strainbench.problem import IntArray
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray
 from strainbench.render.export import surface
 from strainbench.render.film import Film
 from strainbench.render.obstacles import patches

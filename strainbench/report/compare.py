@@ -14,7 +14,7 @@ from rich import box
 from rich.table import Table
 
 from strainbench import escape
-from strainbench.records import RecordsError, Row, open_folder
+from strainbench.bench.records import RecordsError, Row, open_folder
 from strainbench.report.names import cells, digits
 from strainbench.report.pair import SAME, Pair
 from strainbench.report.versions import shown_runs

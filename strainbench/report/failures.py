@@ -15,8 +15,8 @@ from typing import Any
 import pandas as pd
 
 from strainbench import escape
-from strainbench.discovery import find_scenario
-from strainbench.referee import OUTCOMES
+from strainbench.plugins import find_scenario
+from strainbench.referee.certificate import OUTCOMES
 from strainbench.report.numbers import distance_text
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED, machine_line, power

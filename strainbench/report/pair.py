@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from strainbench.records import Row
+from strainbench.bench.records import Row
 from strainbench.report.names import (
     SPANNED,
     cells,

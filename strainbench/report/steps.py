@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from strainbench.records import STEP_COLUMNS, latest_steps
+from strainbench.bench.records import STEP_COLUMNS, latest_steps
 
 
 def newest_steps(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:

@@ -12,9 +12,9 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from strainbench.cell import content_of
-from strainbench.machine import installed
-from strainbench.records import Row, latest_runs, read_machines
+from strainbench.bench.cell import content_of
+from strainbench.bench.machine import installed
+from strainbench.bench.records import Row, latest_runs, read_machines
 from strainbench.sources import ROOT, suite_digest
 
 PLUGINS = ("scenario", "solver")

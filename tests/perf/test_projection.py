@@ -8,9 +8,9 @@ import pytest
 
 from scenarios.swing import Swing
 from strainbench import certify
-from strainbench.discovery import find_solver, list_solvers
-from strainbench.reference import REFERENCE_SOLVER
-from strainbench.solver import run_solver, warm_up
+from strainbench.plugins import find_solver, list_solvers
+from strainbench.referee.reference import REFERENCE_SOLVER
+from strainbench.solver.solver import run_solver, warm_up
 
 TOLERANCE = 1e-6
 NAMES = [e.name for e in list_solvers() if not e.unavailable]

@@ -1,0 +1,201 @@
+"""A cell's process, watched from outside: its steps, its time, its memory, its clock."""
+
+from __future__ import annotations
+
+import signal
+import time
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from strainbench.bench.cell import Cell
+from strainbench.bench.play import EVENTS, GO, Task, play, read_journal
+from strainbench.bench.process import Child, Family
+
+START_LIMIT = 180.0  # [s] to import the suite and plug-ins and to build the problem, cold disks
+WARM_UP_LIMIT = 20.0  # [s] at least, compilation apart; the time limit where that is longer
+GRACE = 2.0  # [s] after the time limit in which a solver may stop by itself
+EXIT_GRACE = 2.0  # [s] from a cell's last word to the end of its process
+FAMILY_SECONDS = 0.25  # [s] between two looks at the memory of what a cell has started
+CLOCK_SLACK = 3.0  # [s] by which a line of a journal may come late on a busy machine
+TAMPERED = "the clock was tampered with"
+
+
+@dataclass
+class Running:
+    """One cell in a process of its own.
+
+    Attributes
+    ----------
+    steps : time steps done so far
+    seen : for each event when it was not there yet, and when it was, by the clock here [s]
+    released : when its clock was allowed to start, or None
+    ending : once ended, why it was ended from outside, or ""
+    """
+
+    cell: Cell
+    folder: Path
+    child: Child
+    memory_limit_mb: float
+    scheduled: float = field(default_factory=time.monotonic)
+    events: list[dict[str, Any]] = field(default_factory=list)
+    seen: list[tuple[float, float]] = field(default_factory=list)
+    steps: int = 0
+    released: float | None = None
+    ending: str = ""
+    _size: int = 0
+    _looked: float = 0.0
+    _counted: float = 0.0
+
+    @classmethod
+    def start(
+        cls,
+        family: Family,
+        cell: Cell,
+        folder: Path,
+        recording: Path | None,
+        memory_limit_mb: float,
+        task: Task = play,
+    ) -> Running:
+        """Start `task` in a new process."""
+        folder.mkdir(parents=True)
+        child = family.start(task, (cell, folder, recording), folder)
+        return cls(cell, folder, child, memory_limit_mb)
+
+    def has_ended(self) -> bool:
+        """Whether it is over, and with it all that it started; stops it if it is over a limit."""
+        code = self.child.exit_code  # before the events are read: none comes after
+        self._read_events()
+        said_all = self._seen("ended")
+        if code is None and not self.ending:
+            if said_all is None:
+                self.ending = self._limit_reached()
+            lingers = said_all is not None and time.monotonic() - said_all > EXIT_GRACE
+            if not self.ending and not lingers:
+                return False
+        elif said_all is None and code is not None:
+            self.ending = self.ending or crashed(code)
+        self.child.stop()
+        self._read_events()
+        self.ending = self.ending or self._clock_lies()
+        return True
+
+    def is_ready(self) -> bool:
+        """Whether it has started, imported and compiled, and waits to be released."""
+        return self.released is None and self._when("ready") is not None
+
+    def release(self) -> None:
+        """Let its clock start."""
+        with suppress(FileNotFoundError):  # a plug-in has removed the folder: seen in a moment
+            (self.folder / GO).touch()
+        self.released = time.monotonic()
+
+    def start_seconds(self) -> float:
+        """Process start, imports, compilation."""
+        return (self._when("ready") or time.monotonic()) - self.scheduled
+
+    def play_seconds(self) -> float:
+        """Physics, set-up and solver."""
+        begun = self._when("started")
+        return (self._when("ended") or time.monotonic()) - begun if begun else 0.0
+
+    def _when(self, event: str) -> float | None:
+        return next((float(e["at"]) for e in self.events if e["event"] == event), None)
+
+    def _seen(self, event: str) -> float | None:
+        """When an event was first seen, by the clock here."""
+        return next(
+            (s for e, (_, s) in zip(self.events, self.seen, strict=True) if e["event"] == event),
+            None,
+        )
+
+    def _read_events(self) -> None:
+        path, before = self.folder / EVENTS, time.monotonic()
+        size = path.stat().st_size if path.exists() else 0
+        if size < self._size:
+            self.ending = self.ending or "its journal was removed or cut while it ran"
+        elif size > self._size:
+            self._size = size
+            events, damage = read_journal(self.folder)
+            new = events[len(self.events) :]
+            self.events += new
+            self.seen += [(self._looked, time.monotonic())] * len(new)
+            self.steps = sum(e["event"] == "step" for e in self.events)
+            self.ending = self.ending or damage
+        self._looked = before
+
+    def _limit_reached(self) -> str:
+        limit, now = self.cell.time_limit, time.monotonic()
+        warming = self._seen("warming")
+        if self.released is not None:
+            if limit is not None and now - self.released > limit + GRACE:
+                return f"time limit of {limit:g} s"
+        elif self._when("ready") is not None:
+            pass  # it waits for us
+        elif warming is None:
+            if now - self.scheduled > START_LIMIT:
+                return f"hung for {START_LIMIT:g} s as it was loaded, before its first projection"
+        else:
+            longest = START_LIMIT if limit is None else max(limit, WARM_UP_LIMIT)
+            compiling = self._compile_seconds(now)
+            if now - warming - min(compiling, START_LIMIT) > longest:
+                return f"hung for {longest:g} s in its warm-up, before its first projection"
+        return self._memory_reached(now)
+
+    def _compile_seconds(self, now: float) -> float:
+        begun = [e["at"] for e in self.events if e["event"] == "compiling"]
+        done = [e["at"] for e in self.events if e["event"] == "compiled"]
+        return float(sum([*done, now][: len(begun)]) - sum(begun))
+
+    def _memory_reached(self, now: float) -> str:
+        if _resident_mb(self.child.process.pid) > self.memory_limit_mb:
+            return f"memory limit of {self.memory_limit_mb:g} MB"
+        if now - self._counted > FAMILY_SECONDS:
+            self._counted = now
+            if _family_mb(self.child.process.pid) > self.memory_limit_mb:
+                return f"memory limit of {self.memory_limit_mb:g} MB, with what it started"
+        return ""
+
+    def _clock_lies(self) -> str:
+        """Whether the journal's times cannot be, as one clock serves all of a machine."""
+        started = self._when("started")
+        if started is None:
+            return ""
+        first = self._seen("started") or 0.0
+        for event, (before, after) in zip(self.events, self.seen, strict=True):
+            if not before - CLOCK_SLACK < event["at"] < after + CLOCK_SLACK:
+                inside, outside = event["at"] - started, max(0.0, before - first)
+                return (
+                    f"{TAMPERED}: it says {inside:.1f} s, "
+                    f"from outside it took {outside:.1f} s at least"
+                )
+        return ""
+
+
+def crashed(code: int) -> str:
+    """In words how a process ended that did not say so itself."""
+    word = " (without a word)" if code == 0 else ""
+    if code < 0:
+        with suppress(ValueError):  # a signal without a name
+            word = f" ({signal.Signals(-code).name})"
+    return f"crashed: its process ended with exit code {code}{word}"
+
+
+def _resident_mb(pid: int) -> float:
+    try:
+        return float(psutil.Process(pid).memory_info().rss / 1024**2)
+    except psutil.Error:
+        return 0.0
+
+
+def _family_mb(pid: int) -> float:
+    """With what a process has started, counting what that shares with it once."""
+    total = _resident_mb(pid)
+    with suppress(psutil.Error):
+        for child in psutil.Process(pid).children(recursive=True):
+            with suppress(psutil.Error):
+                total += child.memory_full_info().uss / 1024**2
+    return total

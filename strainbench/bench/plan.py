@@ -1,0 +1,363 @@
+"""From the words of a command line to cells: the cross product of all that is given."""
+
+from __future__ import annotations
+
+import csv
+import json
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import MISSING, fields, replace
+from itertools import product
+from math import isqrt
+from pathlib import Path
+from typing import Any
+
+import psutil
+
+from strainbench.bench.cell import Cell, PluginRef, file_named
+from strainbench.fields import SETTABLE, NotSettableError, default_of, hints, read
+from strainbench.fields import words as words_of
+from strainbench.options import MOST, shown
+from strainbench.plugins import (
+    Plugin,
+    UnavailableError,
+    find_scenario,
+    find_solver,
+    list_solvers,
+    load_file,
+    nearest,
+    told,
+)
+from strainbench.scenario.scenario import Scenario, SceneWarning
+from strainbench.solver.solver import Solver, warm_twin
+
+MODES = ("simulate", "replay")
+STARTS = ("cold", "warm")
+BYTES_A_CELL = 472
+"""Of a square of two triangles, at least: its vertex, its indices, its rows of the constraints."""
+Choices = dict[str, dict[str, list[str]]]
+"""Values by owner ("" where none was named) and key."""
+
+
+def is_file(word: str) -> bool:
+    """Whether a word means a file rather than a name."""
+    return word.endswith(".py") or "/" in word
+
+
+def parse_settings(words: Iterable[str]) -> Choices:
+    """`key=v1,v2` and `owner.key=v1,v2`, where the owner is a scenario or a solver."""
+    choices: Choices = {}
+    for word in words:
+        key, equals, values = word.partition("=")
+        owner, _, name = key.rpartition(".")
+        if not equals or not name or not values:
+            raise ValueError(f"--set {shown(word)}: KEY=VALUE or KEY=VALUE1,VALUE2 is valid")
+        choices.setdefault(owner, {}).setdefault(name, []).extend(split_values(values))
+    return choices
+
+
+def split_values(text: str) -> list[str]:
+    """Values between commas; one in double quotes, or that is a file as it stands, keeps its own.
+
+    >>> split_values('"a,b.obj",c.obj')
+    ['a,b.obj', 'c.obj']
+    """
+    if "," in text and file_named(text):
+        return [text]
+    try:
+        return next(csv.reader([text], strict=True))
+    except csv.Error as error:
+        valid = 'V1,V2 or "V1,V2" for one value with a comma is valid'
+        raise ValueError(f"--set ...={shown(text)}: {valid} ({error})") from None
+
+
+def parse_value(owner: str, key: str, hint: Any, text: str, file: str = "") -> object:
+    """A value of a field's type; one line for what is none, which names the field and the file."""
+    try:
+        return read(hint, text)
+    except ValueError:
+        valid = f"the value must be {words_of(hint)}"
+        raise ValueError(f"--set {owner}.{key}={text}: {valid}") from None
+    except NotSettableError:
+        what = f"{key} of {owner}{f' in {file}' if file else ''} is a {words_of(hint)}"
+        raise ValueError(f"--set {owner}.{key}: {what}; valid are {SETTABLE}") from None
+
+
+def combinations(
+    kind: type[Scenario] | type[Solver], choices: Choices, shared: bool, file: str = ""
+) -> Iterator[tuple[dict[str, Any], dict[str, str]]]:
+    """Every combination of the values chosen for a plug-in's fields, and the words for them."""
+    chosen = (dict(choices.get("", {})) if shared else {}) | choices.get(kind.name, {})
+    types = hints(kind)
+    for key in chosen:
+        if key not in types:
+            raise ValueError(_no_setting(kind, key, list(types), file))
+    defaults = {f.name: default_of(f) for f in fields(kind)}
+    values = [
+        [(_as_default(parse_value(kind.name, k, types[k], w, file), defaults[k]), w) for w in ws]
+        for k, ws in chosen.items()
+    ]
+    for combination in product(*values):
+        pairs = dict(zip(chosen, combination, strict=True))
+        yield {k: value for k, (value, _) in pairs.items()}, {k: w for k, (_, w) in pairs.items()}
+
+
+def _no_setting(kind: type, key: str, valid: list[str], file: str) -> str:
+    name = getattr(kind, "name", kind.__name__)
+    if any(key in vars(c).get("__annotations__", {}) for c in kind.__mro__):
+        return f"{name} has no setting {key!r}: {kind.__name__} in {file} is no @dataclass"
+    found = f"valid are {', '.join(valid)}{nearest(key, valid)}" if valid else "it has none at all"
+    return f"{name} has no setting {key!r}; {found}"
+
+
+def _as_default(value: object, default: object) -> object:
+    """The default itself where it is the same number, so that 1 and 1.0 are one cell."""
+    numbers = all(type(v) in (int, float) for v in (value, default))
+    return default if numbers and value == default else value
+
+
+@contextmanager
+def blaming(name: str, file: str | None) -> Iterator[None]:
+    """Name the plug-in whose values are not valid, and the file whose code raises anything else."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    except Exception as error:
+        if file is None:  # a fault of ours
+            raise
+        raise ValueError(f"{file}: {name}: {told(error, str(Path(file).resolve()))}") from None
+
+
+def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
+    """The scenarios named, or given as files, with every combination of settings."""
+    refs: list[PluginRef] = []
+    notes: list[str] = []
+    for word in words:
+        file = word if is_file(word) else None
+        path = str(Path(word).resolve()) if file else None
+        for kind in with_defaults(word, Scenario) if file else [find_scenario(word)]:
+            for settings, spelling in combinations(kind, choices, True, file or ""):
+                with blaming(kind.name, file):
+                    scene = kind(**settings)
+                    check_size(scene)
+                    label = scene.labelled(spelling) if spelling else None
+                    refs.append(PluginRef.of(scene, path, label))
+                    notes += scene.notes()
+    for note in dict.fromkeys(notes):
+        warnings.warn(note, SceneWarning, stacklevel=2)
+    return refs
+
+
+def check_size(scene: Scenario) -> None:
+    """ValueError for a resolution at which the arrays alone are larger than the machine."""
+    need = BYTES_A_CELL * scene.resolution**2
+    total = psutil.virtual_memory().total
+    if need > total:
+        raise ValueError(
+            f"resolution is {scene.resolution}: its arrays need {need / 1e9:.0f} GB or more and "
+            f"this machine has {total / 1e9:.0f}; up to {isqrt(total // BYTES_A_CELL)} is valid"
+        )
+
+
+def split_names(words: Sequence[str]) -> list[str]:
+    """The names and paths of a command line; a comma is between two unless a file has it."""
+    return [n for w in words for n in ([w] if is_file(w) and Path(w).exists() else w.split(","))]
+
+
+def plan_solvers(words: Sequence[str], choices: Choices, starts: Sequence[str]) -> list[PluginRef]:
+    """The solvers named, or given as files; "all" is every one of ours, unavailable ones too."""
+    names = split_names(words)
+    if "all" in names:
+        ours = [e.name for e in list_solvers()]
+        names = [n for name in names for n in (ours if name == "all" else [name])]
+    refs: list[PluginRef] = []
+    found: list[tuple[str | None, Solver]] = []
+    for name in dict.fromkeys(names):
+        try:
+            made = from_file(name) if is_file(name) else [find_solver(name)]
+        except UnavailableError as error:
+            refs += [PluginRef(name, name, unavailable=str(error))] if "cold" in starts else []
+            continue
+        found += [(name if is_file(name) else None, solver) for solver in made]
+    for file, solver in found:
+        others = {f and Path(f).resolve() for f, s in found if s.name == solver.name}
+        where = (
+            f" ({'/'.join(Path(file).resolve().parts[-2:])})" if file and len(others) > 1 else ""
+        )
+        refs += _varied(solver, choices, starts, file, where)
+    return list({json.dumps([r.name, r.label, r.identity]): r for r in refs}.values())
+
+
+def _varied(
+    solver: Solver, choices: Choices, starts: Sequence[str], file: str | None, where: str
+) -> list[PluginRef]:
+    """References to a solver with every combination of settings, cold and warm.
+
+    The label is what was typed: its name, or its variant's, and all that was set.
+    """
+    path = str(Path(file).resolve()) if file else None
+    refs = []
+    with blaming(solver.name, file):
+        label = str(solver.label).removesuffix("-warm" if solver.starts_warm else "") + where
+    for settings, spelling in combinations(type(solver), choices, False, file or ""):
+        shown = ",".join(f"{k}={w}" for k, w in spelling.items() if k != "warm")
+        named = f"{label}[{shown}]" if shown else label
+        with blaming(solver.name, file):
+            for s in by_start(replace(solver, **settings), starts):
+                refs.append(PluginRef.of(s, path, named + ("-warm" if s.starts_warm else "")))
+    return refs
+
+
+def by_start(solver: Solver, starts: Sequence[str]) -> list[Solver]:
+    """The solver as it was named for "cold", and its warm twin, if it has one, for "warm"."""
+    cold = [solver] if "cold" in starts else []
+    can = solver.starts_warm is not None and "warm" in starts
+    return [*cold, warm_twin(solver)] if can else cold
+
+
+def never_warm(solvers: Sequence[str]) -> list[str]:
+    """The names of those solvers that have no warm twin."""
+    refs = plan_solvers(solvers, {}, ("cold",))
+    return [ref.label for ref in refs if "warm" not in dict(ref.parameters)]
+
+
+def from_file(file: str) -> list[Solver]:
+    """The solvers of a file, as they are by default."""
+    found = []
+    for kind in with_defaults(file, Solver):
+        with blaming(kind.name, file):
+            found.append(kind())
+    return found
+
+
+def with_defaults(file: str, base: type[Plugin]) -> list[type[Plugin]]:
+    """The plug-ins of a file; ValueError names the fields without a default."""
+    classes = load_file(file, base)
+    for kind in classes:
+        with blaming(kind.name, file):
+            bare = ", ".join(f.name for f in fields(kind) if f.init and default_of(f) is MISSING)
+        if bare:
+            has_none = f"{bare} of {kind.__name__} has none"
+            raise ValueError(f"{file}: every field needs a default; {has_none}")
+    return classes
+
+
+def steps_for(scene: PluginRef, duration: float | None) -> int:
+    """The time steps of a scene that come nearest to `duration` [s], at least one, or its own."""
+    if duration is None:
+        return scene.scenario().usual_steps
+    step = dict(scene.parameters).get("step")
+    if not isinstance(step, int | float):
+        raise ValueError(f"--duration {duration:g}: no time passes in {scene.name}; give --steps")
+    steps = max(1.0, duration / step)
+    if steps > MOST:
+        raise ValueError(f"--duration {duration:g}: {steps:.3g} steps of {scene.name} are too many")
+    return round(steps)
+
+
+def plan(
+    scenarios: Sequence[str],
+    solvers: Sequence[str],
+    settings: Sequence[str],
+    mode: str,
+    steps: int | None,
+    tolerances: Sequence[float],
+    time_limit: float | None,
+    duration: float | None = None,
+    starts: Sequence[str] = ("cold",),
+    threads: int = 1,
+) -> list[Cell]:
+    """All cells of a run; each scene has its own number of steps with a `duration` [s], and where
+    neither that nor `steps` is given.
+
+    Parameters
+    ----------
+    starts : of STARTS; solvers that cannot start warm do so "cold" alone, see `never_warm`.
+
+    Raises
+    ------
+    ValueError
+        One line that names the wrong word and what is valid.
+    """
+    if mode not in MODES:
+        raise ValueError(f"--mode {shown(mode)}: valid are {', '.join(MODES)}")
+    for name, count in (("--steps", steps), ("--threads", threads)):
+        if count is not None and count < 1:
+            raise ValueError(f"{name} {count}: a whole number above 0 is valid")
+    times = (("--time-limit", [time_limit]), ("--duration", [duration]))
+    for name, values in (("--tolerance", tolerances), *times):
+        for value in values:
+            if value is not None and not 0 < value < float("inf"):
+                raise ValueError(f"{name} {value}: a number above 0 is valid")
+    if not starts or not set(starts) <= set(STARTS):
+        raise ValueError(f"--start {shown(','.join(starts))}: valid are cold, warm and cold,warm")
+    choices = parse_settings(settings)
+    scenes = plan_scenarios(scenarios, choices)
+    methods = plan_solvers(solvers, choices, starts)
+    if not methods:
+        raise ValueError(f"--start warm: {', '.join(solvers)} cannot start from the frame before")
+    owners = {ref.name for ref in [*scenes, *methods]}
+    for owner in choices:
+        if owner and owner not in owners:
+            valid = ", ".join(sorted(owners))
+            raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
+    counts = [
+        steps_for(scene, duration) if duration is not None or steps is None else steps
+        for scene in scenes
+    ]
+    cells = [
+        Cell(scene, method, mode, count, tolerance, time_limit, threads)
+        for (scene, count), method, tolerance in product(
+            zip(scenes, counts, strict=True), methods, tolerances
+        )
+    ]
+    return list({cell.key: cell for cell in cells}.values())
+
+
+def plan_scene(
+    scenario: str,
+    solvers: Sequence[str],
+    settings: Sequence[str],
+    steps: int,
+    tolerance: float,
+    time_limit: float | None = None,
+) -> list[Cell]:
+    """One scene with one set of values, and its solvers, from the words of a command line.
+
+    Raises
+    ------
+    ValueError
+        One line: a wrong word, or several scenes.
+    """
+    cells = plan([scenario], solvers, settings, "simulate", steps, [tolerance], time_limit)
+    scenes = {str(cell.scenario.identity) for cell in cells}
+    if len(scenes) > 1:
+        raise ValueError(
+            f"--set and {scenario} give {len(scenes)} scenes: one at a time, "
+            "so one value a setting is valid"
+        )
+    return cells
+
+
+def plan_available(
+    scenario: str, solvers: str, settings: Sequence[str], steps: int, tolerance: float
+) -> list[Cell]:
+    """The same; ValueError for an unavailable solver, with the reason."""
+    cells = plan_scene(scenario, [solvers], settings, steps, tolerance)
+    for cell in cells:
+        if cell.solver.unavailable:
+            raise ValueError(cell.solver.unavailable)
+    return cells
+
+
+def plan_one(
+    scenario: str, solver: str, settings: Sequence[str], steps: int, tolerance: float
+) -> Cell:
+    """The same with a single solver; ValueError names those that the words give."""
+    cells = plan_available(scenario, solver, settings, steps, tolerance)
+    if len(cells) > 1:
+        labels = ", ".join(cell.solver.label for cell in cells)
+        raise ValueError(f"--solver and --set give {len(cells)} solvers ({labels}): one is valid")
+    return cells[0]

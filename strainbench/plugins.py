@@ -1,0 +1,250 @@
+"""Finding solvers and scenarios: by name in the plug-in packages, or by the path of a file."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import hashlib
+import importlib
+import inspect
+import pkgutil
+import sys
+import traceback
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import TypeVar
+
+from strainbench.beside import OURS, Beside
+from strainbench.escape import plain
+from strainbench.scenario.scenario import Scenario
+from strainbench.solver.solver import Solver, method_and_paper, warm_twin
+
+Plugin = TypeVar("Plugin", Solver, Scenario)
+
+
+class UnavailableError(ValueError):
+    """A plug-in of ours that needs what is not installed."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A line of `strainbench list`."""
+
+    name: str
+    method: str
+    paper: str
+    unavailable: str | None = None
+
+
+def _package(name: str) -> ModuleType:
+    """The plug-in package `name`, which must be the one that lies beside strainbench."""
+    package = importlib.import_module(name)
+    beside = Path(__file__).resolve().parent.parent / name
+    if Path(package.__path__[0]).resolve() != beside:
+        raise ImportError(
+            f"the package {name} was found at {package.__path__[0]}, not at {beside}: "
+            f"another package of that name is in the way"
+        )
+    return package
+
+
+def _load(package: str, stem: str) -> ModuleType:
+    """Import a plug-in module; a missing third-party package makes it unavailable."""
+    try:
+        return importlib.import_module(f"{package}.{stem}")
+    except ImportError as error:
+        missing = (error.name or "").split(".")[0]
+        if missing in ("", *OURS):
+            raise
+        raise UnavailableError(f"needs {missing}, which cannot be imported ({error})") from error
+
+
+def _classes(module: ModuleType, base: type[Plugin]) -> list[type[Plugin]]:
+    """The concrete plug-in classes that a module defines itself."""
+    return [
+        c
+        for c in vars(module).values()
+        if inspect.isclass(c)
+        and issubclass(c, base)
+        and (c.__module__ + ".").startswith(module.__name__ + ".")
+        and not inspect.isabstract(c)
+    ]
+
+
+def _stems(package: str) -> list[str]:
+    return sorted(m.name for m in pkgutil.iter_modules(_package(package).__path__))
+
+
+def _summary(package: str, stem: str) -> tuple[str, str]:
+    """Method and paper of a module that cannot be imported, read from its text."""
+    folder = Path(_package(package).__path__[0])
+    path = (
+        folder / f"{stem}.py" if (folder / f"{stem}.py").exists() else folder / stem / "__init__.py"
+    )
+    return method_and_paper(ast.get_docstring(ast.parse(path.read_bytes())))
+
+
+def _variants(solver: type[Solver]) -> Iterator[Solver]:
+    yield solver()
+    for settings in solver.variants.values():
+        yield solver(**settings)
+
+
+def _with_twins(solver: type[Solver]) -> Iterator[Solver]:
+    """The variants, and those that start warm."""
+    for variant in _variants(solver):
+        yield variant
+        if variant.starts_warm is False:
+            yield warm_twin(variant)
+
+
+def list_solvers() -> list[Entry]:
+    """Every solver and variant, with the reason where one is unavailable."""
+    entries = []
+    for stem in _stems("solvers"):
+        try:
+            classes = _classes(_load("solvers", stem), Solver)
+        except UnavailableError as error:
+            entries.append(Entry(stem.replace("_", "-"), *_summary("solvers", stem), str(error)))
+            continue
+        for solver in (v for c in classes for v in _variants(c)):
+            method, paper = method_and_paper(solver.__doc__)
+            entries.append(Entry(solver.label, method, paper, solver.missing()))
+    return entries
+
+
+def list_scenarios() -> list[Entry]:
+    """Every scenario."""
+    classes = [c for s in _stems("scenarios") for c in _classes(_load("scenarios", s), Scenario)]
+    return [Entry(c.name, *method_and_paper(c.__doc__)) for c in classes]
+
+
+def _ours(name: str) -> Solver | None:
+    """Our solver, variant or warm twin of that name, importing no more than may hold it."""
+    for stem in sorted(_stems("solvers"), key=len, reverse=True):
+        if name != stem.replace("_", "-") and not name.startswith(stem.replace("_", "-") + "-"):
+            continue
+        try:
+            module = _load("solvers", stem)
+        except UnavailableError as error:
+            raise UnavailableError(f"solver {name} is unavailable: {error}") from error
+        for solver in (v for c in _classes(module, Solver) for v in _with_twins(c)):
+            if solver.label == name:
+                if missing := solver.missing():
+                    raise UnavailableError(f"solver {name} is unavailable: {missing}")
+                return solver
+    return None
+
+
+def find_solver(name: str) -> Solver:
+    """The solver of a name or of a variant's name, and with "-warm", its warm twin.
+
+    Raises
+    ------
+    UnavailableError
+        If a package that it needs is missing.
+    ValueError
+        If there is none of that name; the message lists those there are.
+    """
+    if solver := _ours(name):
+        return solver
+    valid = [e.name for e in list_solvers()]
+    raise ValueError(
+        f"no solver called {name!r}; valid are {', '.join(valid)}, or the path of a .py file"
+        f"{nearest(name, valid)}"
+    )
+
+
+def find_scenario(name: str) -> type[Scenario]:
+    """The scenario class of a name; ValueError lists those there are."""
+    for stem in _stems("scenarios"):
+        if stem.replace("_", "-") == name:
+            return _classes(_load("scenarios", stem), Scenario)[0]
+    valid = [e.name for e in list_scenarios()]
+    raise ValueError(
+        f"no scenario called {name!r}; valid are {', '.join(valid)}, or the path of a .py file"
+        f"{nearest(name, valid)}"
+    )
+
+
+def nearest(word: str, valid: Iterable[str]) -> str:
+    """A word in brackets that one may have meant, or nothing."""
+    close = difflib.get_close_matches(word.lower(), list(valid), n=1)
+    return f" (did you mean {close[0]}?)" if close else ""
+
+
+def load_file(path: str, base: type[Plugin]) -> list[type[Plugin]]:
+    """The solver or scenario classes that a file defines.
+
+    Raises
+    ------
+    ValueError
+        One line: the file is not there, does not import, defines none, or takes a name of ours.
+    """
+    kind = base.__name__.lower()
+    module = _execute(path)
+    classes = _classes(module, base)
+    if not classes:
+        halves = [f"{c.__name__} lacks {_lacking(c)}" for c in _halves(module, base)]
+        wanted = f"a subclass of strainbench.{base.__name__}"
+        raise ValueError(f"{path} defines no {kind}: {', '.join(halves) or wanted}")
+    for c in classes:
+        name = getattr(c, "name", None)
+        if not isinstance(name, str) or not name.strip():
+            raise ValueError(f'{path}: the {kind} {c.__name__} has no name = "..."')
+        if name in [t.replace("_", "-") for t in _stems(f"{kind}s")] or _ours(name):
+            taken = f"the name {name!r} is taken by our own {kind}"
+            raise ValueError(f"{path}: {taken}; choose another")
+    return classes
+
+
+def _execute(path: str) -> ModuleType:
+    """The module of a file, run anew."""
+    file = Path(path).resolve()
+    if file.is_dir():
+        inside = ", ".join(sorted(str(Path(path, f.name)) for f in file.glob("*.py"))[:3])
+        such = f", such as {inside}" if inside else ""
+        raise ValueError(f"{path} is a folder, no such file: the path of a .py file is valid{such}")
+    if not file.is_file():
+        raise ValueError(f"{path}: no such file")
+    if file.suffix != ".py":
+        raise ValueError(f"{path}: not a Python file")
+    name = f"strainbench_file_{file.stem}_{hashlib.sha256(str(file).encode()).hexdigest()[:12]}"
+    module = ModuleType(name)
+    module.__file__ = str(file)
+    sys.modules[name] = module  # where dataclasses look for it
+    try:
+        Beside(file).execute(module, compile(file.read_bytes(), str(file), "exec"))
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever a user's file raises, SystemExit too, is one line
+        del sys.modules[name]
+        raise ValueError(f"{path} does not import: {told(error, str(file))}") from error
+    return module
+
+
+def told(error: BaseException, file: str = "") -> str:
+    """An exception in one line, with the last line of `file` that it passed through."""
+    lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
+    where = f" (line {lines[-1]})" if lines else ""
+    try:
+        words = plain(error)
+    except Exception:
+        words = "what it says cannot be shown"
+    return f"{type(error).__name__}{': ' if words else ''}{words}{where}"
+
+
+def _halves(module: ModuleType, base: type[Plugin]) -> list[type[Plugin]]:
+    """The abstract plug-in classes that a module defines itself."""
+    return [
+        c
+        for c in vars(module).values()
+        if inspect.isclass(c) and issubclass(c, base) and c.__module__ == module.__name__
+    ]
+
+
+def _lacking(kind: type) -> str:
+    """The methods that an abstract class leaves open."""
+    return ", ".join(sorted(getattr(kind, "__abstractmethods__", ())))

@@ -1,0 +1,41 @@
+"""Regular triangle meshes for the scenes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import IntArray, shape_gradients
+
+
+def square_grid(resolution: int, side: float, diagonals: str) -> tuple[FloatArray, IntArray]:
+    """A square of `resolution` x `resolution` cells, two triangles a cell.
+
+    Parameters
+    ----------
+    resolution : cells a side; vertex i (resolution + 1) + j lies at (i, j) cells.
+    side : length of a side [m].
+    diagonals : "alternating" (a checkerboard of both) or "uniform" (all alike).
+
+    Returns
+    -------
+    rest : (n, 2) [m]
+    elements : (2 resolution^2, 3), all turning the same way
+    """
+    ticks = np.linspace(0.0, side, resolution + 1)
+    rest = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2)
+    i, j = (a.ravel() for a in np.meshgrid(*2 * [np.arange(resolution)], indexing="ij"))
+    v00 = i * (resolution + 1) + j
+    v10, v01, v11 = v00 + resolution + 1, v00 + 1, v00 + resolution + 2
+    rising = np.stack([v00, v10, v11, v00, v11, v01], axis=1)
+    falling = np.stack([v00, v10, v01, v10, v11, v01], axis=1)
+    turn = (i + j) % 2 == 1 if diagonals == "alternating" else np.zeros(len(i), dtype=bool)
+    elements = np.where(turn[:, None], falling, rising).reshape(-1, 3)
+    return rest, elements
+
+
+def lumped_areas(rest: FloatArray, elements: IntArray) -> FloatArray:
+    """(n,) [m^2]: a third of each triangle's rest area (e, 3) at each of its vertices."""
+    areas = np.zeros(len(rest))
+    np.add.at(areas, elements, shape_gradients(rest, elements)[1][:, None] / 3)
+    return areas

@@ -1,0 +1,251 @@
+"""Reference optima for the referee: solved by one solver of the suite, verified here.
+
+Where that one fails another is asked, and where both do the reference says why: an answer is then
+judged by its own positions alone.
+
+A solver is given bounds that are tighter by a hair, or by more where that does not suffice, so that
+its positions are feasible; bound and error are then computed from positions and multipliers alone.
+
+A problem with lower bounds is not convex. Its reference is a local optimum found from the target,
+an objective to compare with and nothing more.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from strainbench.plugins import UnavailableError, find_solver
+from strainbench.problem.limits import FloatArray
+from strainbench.problem.problem import Problem
+from strainbench.solver.solver import Solution, Solver, run_solver
+
+REFERENCE_SOLVER = "newton-ipm"
+SLOW_SOLVER = "clarabel-tight"  # of exact limits in volumes, and where the other one fails
+LOCAL_SOLVER = "ipopt"  # of problems with lower bounds
+TOLERANCE = 1e-11  # asked of the reference solver
+LOCAL_TOLERANCE = 1e-6
+ATTEMPTS = 4  # each but the first with bounds tightened further, by three times the violation
+ENOUGH = 1e-6  # relative gap of a reference that needs no second solver
+MARGIN = 3e-13  # of the first attempt, above what the reference solver leaves of violation
+ACTIVE = 1e-6  # constraints this close to their bound count as active
+Kept = dict[str, tuple[FloatArray, FloatArray, str | None]]
+"""Positions, multipliers, and why they are no optimum, by the content of the problem."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A verified lower bound and, with it, a feasible point.
+
+    Attributes
+    ----------
+    positions : (n, 3) [m], feasible, or NaN where none was found
+    multiplier_norms : (constraints,) |Y_i|
+    lower_bound : on the objective of any feasible point; NaN where the problem is not convex
+    error : rigorous bound on ||positions - x*||, and on ||x_Y - x*|| [m]; infinite without one
+    active_constraints : constraints within ACTIVE of their bound
+    infeasible : why no positions can meet the limits, where that is certain
+    failure : what the reference solvers said, or raised, where they found no optimum
+    """
+
+    positions: FloatArray
+    multiplier_norms: FloatArray
+    lower_bound: float
+    error: float
+    active_constraints: int
+    infeasible: str | None = None
+    failure: str | None = None
+
+
+def objective_floor(problem: Problem) -> float:
+    """Half a squared correction of 1e-3 mean edges a vertex: the least scale of a relative gap."""
+    correction = 1e-3 * problem.edge_length
+    return 0.5 * float(np.sum(problem.weights[problem.free])) * correction * correction
+
+
+def relative(problem: Problem, gap: float, lower_bound: float) -> float:
+    """A gap relative to the lower bound, or to the floor where that is larger."""
+    scale = max(lower_bound, objective_floor(problem))
+    if gap <= 0:
+        return 0.0
+    return gap / scale if 0 < scale < np.inf else float("inf")
+
+
+def local(problem: Problem, positions: FloatArray) -> Reference:
+    """Of a problem that is not convex: nothing is known of other points."""
+    stretches = problem.stretches(positions)
+    active = stretches > problem.bounds - ACTIVE
+    active |= stretches < problem.lower_bounds + ACTIVE
+    nothing = np.full(problem.constraints, np.nan)
+    pins, nan = problem.infeasible_pins(), float("nan")
+    return Reference(positions, nothing, nan, nan, int(np.sum(active)), pins)
+
+
+def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> Reference:
+    """Bounds that hold whatever the positions (n, 3) and multipliers (rows, 3) are.
+
+    Y is scaled by the factor that makes D largest: D = lin^2 / 2 q with
+    lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its own rounding. Where
+    a number overflows, D is 0.
+    """
+    if not problem.convex:
+        return local(problem, positions)
+    Y = np.where(np.isfinite(multipliers), multipliers, 0.0)
+    Y /= np.max(np.abs(Y), initial=0.0) or 1.0  # or the squares of small ones would vanish
+    norms = problem.dual_norms(Y)
+    products = np.sum((Y * (problem.G @ problem.target)).reshape(len(norms), -1), axis=1)
+    terms = products - problem.bounds * norms
+    back = (problem.G.T @ Y)[problem.free]
+    q = float(np.sum(back**2 / problem.weights[problem.free, None]))
+    rounding = 16 * np.finfo(float).eps * 2 * float(np.sum(problem.bounds * norms))
+    linear = float(np.sum(terms) - rounding)
+    with np.errstate(all="ignore"):
+        scale = float(np.divide(linear, q)) if linear > 0 else 0.0
+    lower_bound = 0.5 * linear * scale
+    if not np.isfinite(lower_bound):
+        scale, lower_bound = 0.0, 0.0
+    infeasible = problem.infeasible_pins()
+    if infeasible is None and lower_bound > problem.largest_objective:
+        infeasible = "infeasible: the dual bound exceeds the objective of any point within limits"
+    feasible = bool(np.all(np.isfinite(positions))) and not np.any(problem.violations(positions))
+    if not feasible:
+        nothing = np.full_like(problem.target, np.nan)
+        return Reference(nothing, scale * norms, lower_bound, np.inf, 0, infeasible)
+    gap = max(0.0, problem.objective(positions) - lower_bound)
+    error = np.sqrt(2 * gap / problem.least_weight)
+    active = int(np.sum(problem.stretches(positions) > problem.bounds - ACTIVE))
+    return Reference(positions, scale * norms, lower_bound, float(error), active, infeasible)
+
+
+class ReferenceSolver:
+    """References for the frames of one mesh.
+
+    Parameters
+    ----------
+    problem : any frame; its matrices are prepared once
+    kept : positions and multipliers by content, read and added to; no file, which a cell's
+        solver could read its answers from
+    """
+
+    def __init__(self, problem: Problem, kept: Kept | None = None) -> None:
+        self._solvers = _reference_solvers(problem)
+        self._states: dict[Solver, Any] = {}
+        self._problem = problem
+        self._kept = {} if kept is None else kept
+
+    def __call__(self, problem: Problem) -> Reference:
+        """The reference of a frame of this mesh; one that says so where the solvers failed."""
+        with np.errstate(all="ignore"):  # what overflows is not finite, and judged as that
+            if not np.any(problem.violations(problem.target)):
+                return verify(problem, problem.target, np.zeros((problem.rows, 3)))
+            key = content_key(problem)
+            if key not in self._kept:
+                self._kept[key] = self._solve(problem)
+            positions, multipliers, failure = self._kept[key]
+            return replace(verify(problem, positions, multipliers), failure=failure)
+
+    def _solve(self, problem: Problem) -> tuple[FloatArray, FloatArray, str | None]:
+        """Positions, multipliers, and what the solvers said where these are no optimum.
+
+        The next solver is asked where those before left no answer with a gap below ENOUGH.
+        """
+        positions = np.full_like(problem.target, np.nan)
+        multipliers = np.zeros((problem.rows, 3))
+        if len(problem.free) == 0 or problem.infeasible_pins():
+            return positions, multipliers, None
+        said = []
+        for solver in self._solvers:
+            try:
+                for solution in self._attempts(solver, problem):
+                    positions = _better_positions(problem, solution.positions, positions)
+                    multipliers = _better_multipliers(problem, solution.multipliers, multipliers)
+                said.append(f"{solver.label}: {solution.status}")
+            except Exception as error:  # whatever it is: answers can be judged without
+                words = " ".join(str(error).split())
+                said.append(f"{solver.label}: {type(error).__name__}: {words}")
+            if _enough(problem, positions, multipliers):
+                return positions, multipliers, None
+        return positions, multipliers, "; ".join(said) or None
+
+    def _attempts(self, solver: Solver, problem: Problem) -> Iterator[Solution]:
+        """Solutions with bounds that are tightened until one is feasible."""
+        if solver not in self._states:
+            self._states[solver] = solver.prepare(self._problem)
+        state = self._states[solver]
+        if not problem.convex:
+            yield run_solver(solver, problem, state, LOCAL_TOLERANCE)
+            return
+        margin, half = MARGIN, 0.5 * float(problem.bounds.min())
+        for _ in range(ATTEMPTS):
+            tighter = problem.tightened(min(margin, half))
+            solution = run_solver(solver, tighter, state, TOLERANCE)
+            yield solution
+            violation = float(problem.violations(solution.positions).max())
+            if violation == 0 or not (margin or violation > 0):
+                break
+            # limits that can be met, but not tightened ones, leave it no answer
+            margin = 0.0 if np.isnan(violation) else margin + 3 * violation
+
+
+def _better_positions(problem: Problem, new: FloatArray, old: FloatArray) -> FloatArray:
+    """Of two answers a feasible one, that with the lower objective; else the new one."""
+    if not problem.convex or np.any(problem.violations(old) != 0):
+        return new
+    within = not np.any(problem.violations(new) != 0)
+    return new if within and problem.objective(new) <= problem.objective(old) else old
+
+
+def _better_multipliers(problem: Problem, new: FloatArray | None, old: FloatArray) -> FloatArray:
+    """The multipliers with the higher lower bound."""
+    if not problem.convex or new is None:
+        return old
+    nowhere = np.full_like(problem.target, np.nan)
+    bounds = [verify(problem, nowhere, Y).lower_bound for Y in (new, old)]
+    return new if bounds[0] > bounds[1] else old
+
+
+def _enough(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> bool:
+    """Whether a reference of these is an optimum, or shows that there is none."""
+    if not problem.convex:
+        return bool(np.all(np.isfinite(positions)))
+    reference = verify(problem, positions, multipliers)
+    if not np.isfinite(reference.error):
+        return reference.infeasible is not None
+    gap = problem.objective(positions) - reference.lower_bound
+    return relative(problem, gap, reference.lower_bound) <= ENOUGH
+
+
+def _reference_solvers(problem: Problem) -> list[Solver]:
+    """The solvers of references, in turn; none where only a missing one takes lower bounds."""
+    if problem.convex:
+        solvers = [find_solver(REFERENCE_SOLVER), find_solver(SLOW_SOLVER)]
+        return [solver for solver in solvers if not solver.supports(problem)]
+    try:
+        return [find_solver(LOCAL_SOLVER)]
+    except UnavailableError:
+        return []
+
+
+def reference_of(problem: Problem) -> Reference:
+    """The reference of a single problem, nothing kept."""
+    return ReferenceSolver(problem)(problem)
+
+
+def content_key(problem: Problem) -> str:
+    """A digest of everything that the optimum depends on, and of who found it."""
+    digest = hashlib.sha256(f"{REFERENCE_SOLVER} {TOLERANCE}".encode())
+    for array in (
+        problem.row_vertices,
+        problem.row_coefficients,
+        problem.bounds,
+        problem.lower_bounds,
+        problem.target,
+        problem.pinned,
+        problem.weights,
+    ):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()[:32]

@@ -1,0 +1,5 @@
+"""What a scene is: its mesh, limits, pins, physics, and nothing that it does not need."""
+
+from strainbench.scenario.scenario import Scenario
+
+__all__ = ["Scenario"]

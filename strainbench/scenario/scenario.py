@@ -1,0 +1,369 @@
+"""What a scene is: its mesh, limits, pins, physics, and nothing that it does not need."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from math import ceil
+from time import perf_counter
+from typing import ClassVar
+
+import numpy as np
+
+from strainbench.fields import same, spelled
+from strainbench.physics.cloth import Cloth, Material
+from strainbench.physics.energies.contact import Contact
+from strainbench.physics.implicit_euler import (
+    GRAVITY,
+    NewtonReport,
+    NewtonSettings,
+    minimise_step,
+)
+from strainbench.physics.integrators import INTEGRATORS, Motion
+from strainbench.problem.grid import lumped_areas
+from strainbench.problem.limits import FloatArray, StretchLimits
+from strainbench.problem.problem import IntArray, Problem
+
+EASY_LIMIT = 0.01  # tighter ones are checked on this one
+FEWEST_STEPS = 10  # of a run that is not told how many
+
+
+class SceneWarning(UserWarning):
+    """What a scene says of itself when it is planned; see `Scenario.notes`."""
+
+
+@dataclass(frozen=True)
+class StepReport:
+    """What the physics of one time step cost, whether it converged, and where it left the cloth.
+
+    Energies are in J, with the velocities after the projection; heights count from y = 0. The
+    momentum is in kg m/s. `pin_work` [J] is the work of the forces that hold the pins, as the
+    minimisations of the step find them; it is 0 for pins that do not move. `penetration` [m] is
+    the depth of the deepest vertex inside an obstacle, after the projection. Of a scene at rest,
+    `equilibrium_residual` is the force that is left, relative to the weight, and
+    `equilibrium_distance` [m] how far the farthest vertex is from a certified equilibrium.
+    """
+
+    time: float = 0.0  # [s], at the end of the step
+    ie_seconds: float = 0.0  # in implicit Euler's Newton solver
+    newton_iterations: int = 0
+    newton_converged: bool = True
+    assembly_seconds: float = 0.0  # of ie_seconds: of Hessians
+    factorisation_seconds: float = 0.0  # and the solves with the factors
+    line_search_seconds: float = 0.0  # energies and gradients
+    kinetic_energy: float = float("nan")
+    gravity_energy: float = float("nan")
+    membrane_energy: float = float("nan")
+    bending_energy: float = float("nan")
+    momentum_x: float = float("nan")
+    momentum_y: float = float("nan")
+    momentum_z: float = float("nan")
+    pin_work: float = 0.0
+    contact_energy: float = 0.0
+    penetration: float = 0.0
+    equilibrium_residual: float = float("nan")
+    equilibrium_distance: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Scenario(ABC):
+    """A scene: a frozen dataclass whose fields can be set from the command line.
+
+    The first line of the docstring reads "scene (paper)". `needs` names the physics that the
+    scene cannot do without; what it does not need is not built. `about` names what the scene waits
+    for, if it waits for anything: a run in which that has not happened says so.
+
+    Parameters
+    ----------
+    resolution : cells a side.
+    limit : largest strain allowed; 0.01 is 1%.
+    directions : sampled directions an element, or "exact" for a limit on the largest singular
+        value.
+    """
+
+    name: ClassVar[str]
+    needs: ClassVar[frozenset[str]]
+    about: ClassVar[str] = ""
+
+    resolution: int = 20
+    limit: float = 0.01
+    directions: int | str = 4
+
+    def __post_init__(self) -> None:
+        if self.resolution < 1:
+            raise ValueError(f"resolution is {self.resolution}: a whole number above 0 is valid")
+        if not 0 < self.limit < 1:
+            raise ValueError(
+                f"limit is {self.limit}: a strain between 0 and 1 is valid, 0.01 or 1% for 1%"
+            )
+        if self.directions != "exact" and (isinstance(self.directions, str) or self.directions < 1):
+            valid = "a whole number above 0, or exact, is valid"
+            raise ValueError(f"directions is {self.directions}: {valid}")
+
+    @abstractmethod
+    def problem(self) -> Problem:
+        """The projection at the start: mesh, limits, pins, and the initial positions as target."""
+
+    @abstractmethod
+    def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
+        """Run the scene, step by step, with `project` limiting each candidate."""
+
+    def warm_up(self) -> None:
+        """Compile what `play` compiles on first use, off the clock."""
+        next(replace(self, resolution=2).play(lambda target: target))
+
+    def easier(self) -> Scenario | None:
+        """The neighbour on which a failure here is checked; None where this one is easy itself."""
+        return replace(self, limit=EASY_LIMIT) if self.limit < EASY_LIMIT else None
+
+    def notes(self) -> list[str]:
+        """What a user should know of this scene, such as odd things in its files; a line each."""
+        return []
+
+    @property
+    def first_step(self) -> float:
+        """The step in which what the scene is about begins, as far as that is known."""
+        return 1
+
+    @property
+    def usual_steps(self) -> int:
+        """Time steps of a run that is not told how many: enough for what the scene is about."""
+        return FEWEST_STEPS
+
+    def has_begun(self, candidate: FloatArray) -> bool:  # noqa: ARG002
+        """Whether what the scene is about happens where `candidate` (n, 3) is to be projected."""
+        return True
+
+    @property
+    def parameters(self) -> dict[str, object]:
+        """The fields and their values."""
+        return {f.name: getattr(self, f.name) for f in fields(self)}
+
+    def sampled_angles(self) -> FloatArray:
+        """(directions,) equally spaced in [-pi/2, pi/2) [rad], for limits given by a curve."""
+        if isinstance(self.directions, str):
+            raise ValueError(f"directions is exact: {self.name} samples a curve of limits")
+        return -np.pi / 2 + np.pi * np.arange(self.directions) / self.directions
+
+    @property
+    def label(self) -> str:
+        """Name, resolution and limit, then what else differs from the defaults."""
+        return self.labelled({})
+
+    def labelled(self, words: Mapping[str, str]) -> str:
+        """The same; what was set in `words` is there as it was spelled, defaults too."""
+        default = type(self)().parameters
+        others = "".join(
+            f", {k}={words.get(k) or spelled(v)}"
+            for k, v in self.parameters.items()
+            if k not in ("resolution", "limit") and (k in words or not same(v, default[k]))
+        )
+        return f"{self.name} {self.resolution} at {100 * self.limit:.12g}%{others}"
+
+    def limits(self) -> StretchLimits:
+        """The same bound in all directions."""
+        if isinstance(self.directions, str):
+            return StretchLimits.exact(1 + self.limit)
+        return StretchLimits.isotropic(1 + self.limit, self.directions)
+
+    def curve(self) -> tuple[FloatArray, FloatArray] | None:
+        """Angles (a,) [rad] and bounds (a,) of the curve that `limits` samples, for polar plots.
+
+        None where a scene has limits of its own and does not say.
+        """
+        if type(self).limits is not Scenario.limits:
+            return None
+        angles = np.linspace(-np.pi / 2, np.pi / 2, 180, endpoint=False)
+        return angles, np.full(len(angles), 1 + self.limit)
+
+
+@dataclass(frozen=True)
+class SheetScenario(Scenario):
+    """A sheet of triangles, without physics of its own.
+
+    Parameters
+    ----------
+    norm : "mass", or "unweighted" as printed in Eq. 5. Without a material the masses are those
+        of a sheet of 1 kg/m^2: a factor common to all changes no projection.
+    """
+
+    norm: str = "mass"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.norm not in ("unweighted", "mass"):
+            raise ValueError(f"norm is {self.norm!r}: valid are unweighted, mass")
+
+    @abstractmethod
+    def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
+        """Rest positions (n, 2), triangles (e, 3), initial positions (n, 3), pins (p,)."""
+
+    def mass(self) -> FloatArray:
+        """(n,) [kg], lumped at the vertices."""
+        return lumped_areas(*self.sheet()[:2])
+
+    def problem(self) -> Problem:
+        """The projection, with the sheet's initial positions as its target."""
+        rest, elements, positions, pinned = self.sheet()
+        mass = self.mass() if self.norm == "mass" else None
+        return Problem(rest, elements, positions, self.limits(), pinned, mass)
+
+
+@dataclass(frozen=True)
+class ClothScenario(SheetScenario):
+    """A sheet of cloth, stepped by one of the paper's schemes.
+
+    Gravity, membrane and bending are built where they are in `needs`; without "inertia" each step
+    starts at rest. `begins` is when what the scene is about begins, and `lasts` how long a run
+    shows it, both in seconds of its time.
+
+    Parameters
+    ----------
+    integrator : sap, sar, bap or bar as in the paper, or sar-projected, bar-bdf2 or bar-stable,
+        our variants of them: `strainbench.physics.integrators`.
+    step : time step [s].
+    norm : "unweighted" as printed in Eq. 5, or "mass".
+    """
+
+    about: ClassVar[str] = "contact"
+    begins: ClassVar[float] = 0.0
+    lasts: ClassVar[float] = 0.0
+
+    norm: str = "unweighted"
+    integrator: str = "sap"
+    step: float = 1 / 60
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.integrator not in INTEGRATORS:
+            valid = ", ".join(INTEGRATORS)
+            raise ValueError(f"integrator is {self.integrator!r}: valid are {valid}")
+        if not 0 < self.step < float("inf"):
+            raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
+
+    @property
+    def first_step(self) -> float:
+        """See the base class."""
+        return max(1, ceil(self.begins / self.step))
+
+    @property
+    def usual_steps(self) -> int:
+        """See the base class."""
+        return max(FEWEST_STEPS, ceil(self.lasts / self.step))
+
+    def has_begun(self, candidate: FloatArray) -> bool:
+        """See the base class: whether a vertex is in an obstacle's margin, if there are any."""
+        contact = self.contact()
+        return contact is None or contact.touches(candidate)
+
+    def material(self) -> Material:
+        """The constants of Tang et al. 2022, section 5; without the energies not needed."""
+        return Material().only(self.needs)
+
+    def contact(self) -> Contact | None:
+        """What the sheet is kept off, or None."""
+        return None
+
+    def force(
+        self,
+        positions: FloatArray,  # noqa: ARG002
+        velocities: FloatArray,  # noqa: ARG002
+        time: float,  # noqa: ARG002
+    ) -> FloatArray | None:
+        """(n, 3) explicit forces [N] besides gravity, or None if there are none.
+
+        Parameters
+        ----------
+        positions : (n, 3) [m], at the start of the sub-step.
+        velocities : (n, 3) [m/s], at the start of the step.
+        time : [s], at the end of the sub-step.
+        """
+        return None
+
+    def cloth(self) -> Cloth:
+        """The sheet's masses and energies."""
+        rest, elements, _, pinned = self.sheet()
+        return Cloth(rest, elements, self.material(), pinned, self.contact())
+
+    def mass(self) -> FloatArray:
+        """(n,) [kg], lumped at the vertices."""
+        return self.cloth().mass
+
+    def pin_positions(self, time: float) -> FloatArray | None:  # noqa: ARG002
+        """(p, 3) where the pins are at `time` [m], or None if they never move."""
+        return None
+
+    def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
+        """Time steps from rest; see the base class."""
+        cloth = self.cloth()
+        positions = self.sheet()[2]
+        motion = Motion(positions, np.zeros_like(positions), 0.0)
+        scheme = INTEGRATORS[self.integrator]
+        _ = cloth.linear_solver  # sparsity and ordering, once a mesh: part of no step
+        while True:
+            step = _Step(self, cloth, motion.velocities)
+            motion = scheme(motion, self.step, step.minimise, project)
+            yield step.report(motion)
+            if "inertia" not in self.needs:
+                motion = Motion(motion.positions, np.zeros_like(positions), motion.time)
+
+
+class _Step:
+    """The minimisations of one time step, and what they cost."""
+
+    def __init__(self, scene: ClothScenario, cloth: Cloth, velocities: FloatArray) -> None:
+        self.scene, self.cloth, self.velocities = scene, cloth, velocities
+        self.settings = NewtonSettings()
+        self.gravity = GRAVITY if "gravity" in scene.needs else np.zeros(3)
+        self.seconds, self.pin_work = 0.0, 0.0
+        self.newton: list[NewtonReport] = []
+
+    def minimise(
+        self, start: FloatArray, inertial: FloatArray, step: float, time: float
+    ) -> FloatArray:
+        """The candidate of a sub-step, with the pins where the scene has them at `time`."""
+        begin = perf_counter()
+        pinned, first = self.cloth.pinned, start.copy()
+        where = self.scene.pin_positions(time)
+        first[pinned] = start[pinned] if where is None else where
+        inertial = inertial + step**2 * (self.gravity - GRAVITY)  # the schemes add it to all
+        push = self.scene.force(start, self.velocities, time)
+        if push is not None:
+            inertial = inertial + step**2 * push / self.cloth.mass[:, None]
+        found, report = minimise_step(self.cloth, first, inertial, step, self.settings)
+        self.seconds += perf_counter() - begin
+        self.newton.append(report)
+        if where is not None:
+            inertia = self.cloth.mass[:, None] * (found - inertial) / step**2
+            gradient = self.cloth.energies(found)[-1]
+            self.cloth.add_contact_gradient(found, gradient)
+            force = (gradient + inertia)[pinned]
+            self.pin_work += float(np.sum(force * (found - start)[pinned]))
+        return found
+
+    def report(self, motion: Motion) -> StepReport:
+        """The step's costs, and energy and momentum after it."""
+        mass, v = self.cloth.mass[:, None], motion.velocities
+        membrane, bending, gradient = self.cloth.energies(motion.positions)
+        contact = self.cloth.contact
+        momentum = np.sum(mass * v, axis=0)
+        return StepReport(
+            time=motion.time,
+            ie_seconds=self.seconds,
+            newton_iterations=sum(r.iterations for r in self.newton),
+            newton_converged=all(r.converged for r in self.newton),
+            assembly_seconds=sum(r.assembly_seconds for r in self.newton),
+            factorisation_seconds=sum(r.factorisation_seconds for r in self.newton),
+            line_search_seconds=sum(r.line_search_seconds for r in self.newton),
+            kinetic_energy=0.5 * float(np.sum(mass * v**2)),
+            gravity_energy=-float(np.sum(mass * motion.positions @ self.gravity[:, None])),
+            membrane_energy=membrane,
+            bending_energy=bending,
+            momentum_x=float(momentum[0]),
+            momentum_y=float(momentum[1]),
+            momentum_z=float(momentum[2]),
+            pin_work=self.pin_work,
+            contact_energy=self.cloth.add_contact_gradient(motion.positions, gradient),
+            penetration=contact.penetration(motion.positions) if contact else 0.0,
+        )

@@ -1,0 +1,1 @@
+"""Measurements beside the cells: convergence, ratios of times, what parts of a scene change."""

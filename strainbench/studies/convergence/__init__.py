@@ -1,0 +1,1 @@
+"""Solvers followed on one projection: violation, gap and distance against time."""

@@ -1,0 +1,1 @@
+"""Ratios of times: solvers in turns on the same projections."""

@@ -1,0 +1,61 @@
+"""On random problems of every kind nothing raises, and nothing false is said.
+
+`pytest tests/referee/test_random_problems.py --problems 2000` checks so many, by default a few.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from strainbench import certify, solve
+from strainbench.plugins import find_solver, list_solvers
+from strainbench.referee.certificate import OUTCOMES
+from strainbench.referee.reference import objective_floor, reference_of
+from tests.hard_problems import hard_problem
+
+PROBLEMS = 40
+CERTIFIED = ("newton-ipm", "clarabel")
+OTHERS = [e.name for e in list_solvers() if not e.unavailable and e.name not in CERTIFIED]
+GAP = 1e-4
+TIME_LIMIT = 0.2  # [s] a solve
+
+
+def pytest_generate_tests(metafunc):
+    if "seed" in metafunc.fixturenames:
+        count = metafunc.config.getoption("problems")
+        metafunc.parametrize("seed", range(PROBLEMS if count is None else count))
+
+
+def falsehoods(problem, reference, answers):
+    """What is false in what solvers and the referee say of (positions, status, certificate)."""
+    floor = objective_floor(problem)
+    feasible = [c.objective for _, _, c in answers.values() if c.max_violation == 0]
+    best = min(feasible, default=np.inf)
+    if not best >= reference.lower_bound * (1 - 1e-12):
+        yield f"an objective of {best} below the bound {reference.lower_bound}"
+    if reference.infeasible and feasible:
+        yield f"{reference.infeasible}: but there are feasible positions"
+    for name, (_, status, found) in answers.items():
+        if name in CERTIFIED and status == "solved" and found.outcome != "optimal":
+            yield f"{name} says solved: {found.outcome}, {found.reason}"
+        above = found.objective - best
+        if found.outcome == "optimal" and above > GAP * max(best, floor) * (1 + 1e-9):
+            yield f"{name} is called optimal, {above} above another's objective {best}"
+
+
+def test_nothing_raises_and_nothing_false_is_said(seed):
+    problem = hard_problem(np.random.default_rng([2026, seed]))
+    reference = reference_of(problem)
+    guesses = {"target": problem.target, "nowhere": np.zeros_like(problem.target)}
+    answers = {
+        name: (x, "", certify(problem, x, reference=reference)) for name, x in guesses.items()
+    }
+    for name in (*CERTIFIED, OTHERS[seed % len(OTHERS)]):
+        if find_solver(name).supports(problem):
+            continue
+        found = solve(problem, name, time_limit=TIME_LIMIT)
+        certificate = certify(problem, found.positions, reference=reference)
+        assert certificate.outcome in OUTCOMES
+        answers[name] = found.positions, found.status, certificate
+    if problem.convex:
+        assert not list(falsehoods(problem, reference, answers))
