@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import FloatArray, StretchLimits
-from strainbench.problem.problem import IntArray
+from strainbench.problem.limits import StretchLimits
 from strainbench.scenario.scenario import ClothScenario
 
 SIDE = 0.5  # [m]

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.energies.contact import Contact, Floor, Sphere
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
 from strainbench.scenario.scenario import ClothScenario
 
 SIDE = 0.5  # [m]

@@ -10,13 +10,14 @@ from scipy.integrate import cumulative_simpson
 from scipy.optimize import brentq
 from scipy.special import j0
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.equilibrium import BarrierSettings, equilibrium
 from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.statics import Equilibrium, StaticsSettings, constrained_minimum
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import FloatArray, StretchLimits
-from strainbench.problem.problem import IntArray, Problem
+from strainbench.problem.limits import StretchLimits
+from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import Scenario, StepReport
 
 SIDE = 0.5  # [m]

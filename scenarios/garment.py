@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.scenario.meshcheck import (
     level_openings,
     odd_edges,

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, Problem
+from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import Scenario, SheetScenario, StepReport
 
 SIDE = 0.5  # [m]

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, longest_edges
+from strainbench.problem.problem import longest_edges
 from strainbench.scenario.scenario import FEWEST_STEPS, Scenario, SheetScenario, StepReport
 
 SIDE = 0.5  # [m]

@@ -11,8 +11,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.arrays import FloatArray
 from strainbench.problem.conic import ConicForm
-from strainbench.problem.limits import FloatArray
 from strainbench.referee.reference import objective_floor
 
 CONES = {

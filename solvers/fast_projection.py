@@ -34,8 +34,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
+from strainbench.arrays import FloatArray, IntArray
 
 EXPLODED = 1e3
 """Largest C, beside the target's own or 1, beyond which positions are given up."""

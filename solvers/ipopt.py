@@ -19,8 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
 

@@ -31,7 +31,7 @@ import osqp
 import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 from strainbench.referee.reference import objective_floor, verify
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still

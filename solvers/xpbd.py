@@ -35,8 +35,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.problem.limits import FloatArray
 from strainbench.solver.memory import Memory
 
 ROWS_A_CHUNK = 3_000_000

@@ -3,13 +3,14 @@
 What is imported from here stays here, wherever the modules behind it lie.
 """
 
-from strainbench.api import solve
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import FloatArray, StretchLimits
-from strainbench.problem.problem import IntArray, Problem
+from strainbench.problem.limits import StretchLimits
+from strainbench.problem.problem import Problem
 from strainbench.referee.certificate import Certificate, certify
 from strainbench.scenario.scenario import ClothScenario, Scenario, SheetScenario, StepReport
 from strainbench.solver.memory import Memory
+from strainbench.solver.solve import solve
 from strainbench.solver.solver import Clock, Solution, Solver
 
 __version__ = "0.1.0"

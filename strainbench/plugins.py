@@ -1,4 +1,4 @@
-"""Finding solvers and scenarios: by name in the plug-in packages, or by the path of a file."""
+"""Finding plug-ins: by name in a package of ours, or by the path of a file."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import hashlib
 import importlib
 import inspect
 import pkgutil
+import re
 import sys
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -18,10 +19,8 @@ from typing import TypeVar
 
 from strainbench.beside import OURS, Beside
 from strainbench.escape import plain
-from strainbench.scenario.scenario import Scenario
-from strainbench.solver.solver import Solver, method_and_paper, warm_twin
 
-Plugin = TypeVar("Plugin", Solver, Scenario)
+Plugin = TypeVar("Plugin")
 
 
 class UnavailableError(ValueError):
@@ -29,7 +28,7 @@ class UnavailableError(ValueError):
 
 
 @dataclass(frozen=True)
-class Entry:
+class Listed:
     """A line of `strainbench list`."""
 
     name: str
@@ -50,7 +49,7 @@ def _package(name: str) -> ModuleType:
     return package
 
 
-def _load(package: str, stem: str) -> ModuleType:
+def load(package: str, stem: str) -> ModuleType:
     """Import a plug-in module; a missing third-party package makes it unavailable."""
     try:
         return importlib.import_module(f"{package}.{stem}")
@@ -61,7 +60,7 @@ def _load(package: str, stem: str) -> ModuleType:
         raise UnavailableError(f"needs {missing}, which cannot be imported ({error})") from error
 
 
-def _classes(module: ModuleType, base: type[Plugin]) -> list[type[Plugin]]:
+def classes(module: ModuleType, base: type[Plugin]) -> list[type[Plugin]]:
     """The concrete plug-in classes that a module defines itself."""
     return [
         c
@@ -73,11 +72,12 @@ def _classes(module: ModuleType, base: type[Plugin]) -> list[type[Plugin]]:
     ]
 
 
-def _stems(package: str) -> list[str]:
+def stems(package: str) -> list[str]:
+    """The names of the modules of a plug-in package."""
     return sorted(m.name for m in pkgutil.iter_modules(_package(package).__path__))
 
 
-def _summary(package: str, stem: str) -> tuple[str, str]:
+def summary(package: str, stem: str) -> tuple[str, str]:
     """Method and paper of a module that cannot be imported, read from its text."""
     folder = Path(_package(package).__path__[0])
     path = (
@@ -86,86 +86,19 @@ def _summary(package: str, stem: str) -> tuple[str, str]:
     return method_and_paper(ast.get_docstring(ast.parse(path.read_bytes())))
 
 
-def _variants(solver: type[Solver]) -> Iterator[Solver]:
-    yield solver()
-    for settings in solver.variants.values():
-        yield solver(**settings)
+def method_and_paper(docstring: str | None) -> tuple[str, str]:
+    """The first line of a docstring, "method (paper)", as its two parts."""
+    line = (docstring or "").strip().split("\n")[0].rstrip(".")
+    match = re.fullmatch(r"(.*?)\s*\((.*)\)", line)
+    return (match[1], match[2]) if match else (line, "")
 
 
-def _with_twins(solver: type[Solver]) -> Iterator[Solver]:
-    """The variants, and those that start warm."""
-    for variant in _variants(solver):
-        yield variant
-        if variant.starts_warm is False:
-            yield warm_twin(variant)
-
-
-def list_solvers() -> list[Entry]:
-    """Every solver and variant, with the reason where one is unavailable."""
-    entries = []
-    for stem in _stems("solvers"):
-        try:
-            classes = _classes(_load("solvers", stem), Solver)
-        except UnavailableError as error:
-            entries.append(Entry(stem.replace("_", "-"), *_summary("solvers", stem), str(error)))
-            continue
-        for solver in (v for c in classes for v in _variants(c)):
-            method, paper = method_and_paper(solver.__doc__)
-            entries.append(Entry(solver.label, method, paper, solver.missing()))
-    return entries
-
-
-def list_scenarios() -> list[Entry]:
-    """Every scenario."""
-    classes = [c for s in _stems("scenarios") for c in _classes(_load("scenarios", s), Scenario)]
-    return [Entry(c.name, *method_and_paper(c.__doc__)) for c in classes]
-
-
-def _ours(name: str) -> Solver | None:
-    """Our solver, variant or warm twin of that name, importing no more than may hold it."""
-    for stem in sorted(_stems("solvers"), key=len, reverse=True):
-        if name != stem.replace("_", "-") and not name.startswith(stem.replace("_", "-") + "-"):
-            continue
-        try:
-            module = _load("solvers", stem)
-        except UnavailableError as error:
-            raise UnavailableError(f"solver {name} is unavailable: {error}") from error
-        for solver in (v for c in _classes(module, Solver) for v in _with_twins(c)):
-            if solver.label == name:
-                if missing := solver.missing():
-                    raise UnavailableError(f"solver {name} is unavailable: {missing}")
-                return solver
-    return None
-
-
-def find_solver(name: str) -> Solver:
-    """The solver of a name or of a variant's name, and with "-warm", its warm twin.
-
-    Raises
-    ------
-    UnavailableError
-        If a package that it needs is missing.
-    ValueError
-        If there is none of that name; the message lists those there are.
-    """
-    if solver := _ours(name):
-        return solver
-    valid = [e.name for e in list_solvers()]
-    raise ValueError(
-        f"no solver called {name!r}; valid are {', '.join(valid)}, or the path of a .py file"
-        f"{nearest(name, valid)}"
-    )
-
-
-def find_scenario(name: str) -> type[Scenario]:
-    """The scenario class of a name; ValueError lists those there are."""
-    for stem in _stems("scenarios"):
-        if stem.replace("_", "-") == name:
-            return _classes(_load("scenarios", stem), Scenario)[0]
-    valid = [e.name for e in list_scenarios()]
-    raise ValueError(
-        f"no scenario called {name!r}; valid are {', '.join(valid)}, or the path of a .py file"
-        f"{nearest(name, valid)}"
+def no_such(kind: str, name: str, valid: Iterable[str]) -> ValueError:
+    """What there is to say of a name that nothing has."""
+    known = list(valid)
+    return ValueError(
+        f"no {kind} called {name!r}; valid are {', '.join(known)}, or the path of a .py file"
+        f"{nearest(name, known)}"
     )
 
 
@@ -175,8 +108,12 @@ def nearest(word: str, valid: Iterable[str]) -> str:
     return f" (did you mean {close[0]}?)" if close else ""
 
 
-def load_file(path: str, base: type[Plugin]) -> list[type[Plugin]]:
-    """The solver or scenario classes that a file defines.
+def load_file(path: str, base: type[Plugin], taken: Callable[[str], bool]) -> list[type[Plugin]]:
+    """The plug-in classes that a file defines.
+
+    Parameters
+    ----------
+    taken : whether a name is one of ours
 
     Raises
     ------
@@ -185,19 +122,19 @@ def load_file(path: str, base: type[Plugin]) -> list[type[Plugin]]:
     """
     kind = base.__name__.lower()
     module = _execute(path)
-    classes = _classes(module, base)
-    if not classes:
+    found = classes(module, base)
+    if not found:
         halves = [f"{c.__name__} lacks {_lacking(c)}" for c in _halves(module, base)]
         wanted = f"a subclass of strainbench.{base.__name__}"
         raise ValueError(f"{path} defines no {kind}: {', '.join(halves) or wanted}")
-    for c in classes:
+    for c in found:
         name = getattr(c, "name", None)
         if not isinstance(name, str) or not name.strip():
             raise ValueError(f'{path}: the {kind} {c.__name__} has no name = "..."')
-        if name in [t.replace("_", "-") for t in _stems(f"{kind}s")] or _ours(name):
-            taken = f"the name {name!r} is taken by our own {kind}"
-            raise ValueError(f"{path}: {taken}; choose another")
-    return classes
+        if taken(name):
+            ours = f"the name {name!r} is taken by our own {kind}"
+            raise ValueError(f"{path}: {ours}; choose another")
+    return found
 
 
 def _execute(path: str) -> ModuleType:

@@ -8,7 +8,7 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from strainbench.plugins import find_scenario, list_scenarios
+from strainbench.scenario.registry import find_scenario, list_scenarios
 
 NAMES = [e.name for e in list_scenarios()]
 

@@ -7,8 +7,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from strainbench import Problem, StretchLimits, certify, solve
-from strainbench.plugins import UnavailableError, find_scenario, find_solver, list_solvers
+from strainbench.plugins import UnavailableError
 from strainbench.referee.reference import reference_of
+from strainbench.scenario.registry import find_scenario
+from strainbench.solver.registry import find_solver, list_solvers
 from strainbench.solver.solver import run_solver, warm_twin
 from tests.problems import random_problem
 

@@ -9,7 +9,8 @@ import pytest
 
 from strainbench.bench.plan import parse_value, plan
 from strainbench.cli.listing import described, found, tables
-from strainbench.plugins import list_scenarios, list_solvers
+from strainbench.scenario.registry import list_scenarios
+from strainbench.solver.registry import list_solvers
 from tests.command import command
 
 ODD = '''

@@ -60,11 +60,11 @@ def test_example_solver_is_short_and_honest(tmp_path):
     path.write_text(source)
     import numpy as np
 
-    from strainbench import Solver, certify, solve
-    from strainbench.plugins import load_file
+    from strainbench import certify, solve
+    from strainbench.solver.registry import solvers_of
     from tests.problems import random_problem
 
-    (solver,) = load_file(str(path), Solver)
+    (solver,) = solvers_of(str(path))
     problem = random_problem(np.random.default_rng(0), directions=4, limit=0.1)
     assert certify(problem, solve(problem, solver()).positions).outcome == "feasible"
 

@@ -30,7 +30,7 @@ import numpy as np
 from solvers.admm.anderson import Anderson
 from solvers.admm.rows import Rows
 from strainbench import Clock, Problem, Solution, Solver
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 from strainbench.referee.reference import objective_floor
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 
 
 class Anderson:

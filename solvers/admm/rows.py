@@ -6,9 +6,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Problem
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
 from strainbench.physics.linear import SuperLU
-from strainbench.problem.limits import FloatArray
 
 
 class Rows:

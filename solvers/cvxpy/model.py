@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from strainbench import Problem
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 
 SCALING = 16.0  # of the objective in units of 1/edge^2 over the mean mass, as `clarabel` has it
 

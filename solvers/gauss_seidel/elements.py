@@ -34,8 +34,8 @@ from numpy.typing import NDArray
 
 from solvers.gauss_seidel.strain import polar, strain_change, symmetric, violation
 from strainbench import Problem
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.problem.limits import FloatArray
 
 ENTRIES = np.array([[1, 0], [0, 1], [0.5**0.5, 0.5**0.5], [0.5**0.5, -(0.5**0.5)]])
 """Warp, weft and the two diagonals: what the entries of a strain can limit."""

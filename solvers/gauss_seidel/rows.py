@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strainbench import Problem
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.problem.limits import FloatArray
 
 NO_LEVERAGE = 1e-12
 """Coefficients smaller than this beside the row's largest are rounding, and move nothing."""

@@ -69,8 +69,8 @@ from solvers.newton_ipm.infeasible import infeasible_multipliers
 from solvers.newton_ipm.iterate import STRICTER, Iterate, State
 from solvers.newton_ipm.sampled import ROUNDING
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.arrays import FloatArray
 from strainbench.physics.linear import NotPositiveDefiniteError
-from strainbench.problem.limits import FloatArray
 from strainbench.referee.reference import objective_floor, verify
 
 PATIENCE = 25  # iterations after which a warm start is given up

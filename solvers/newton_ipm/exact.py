@@ -19,9 +19,9 @@ import numpy as np
 from solvers.newton_ipm.mesh import Change, gather, spread, spread_blocks
 from solvers.newton_ipm.sampled import ROUNDING
 from strainbench import Problem
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
 from strainbench.physics.pattern import Pattern
-from strainbench.problem.limits import FloatArray
 
 ROOT_HALF = 0.5**0.5
 OFF = np.array([1.0, 1.0, 2.0])  # an off-diagonal entry counts twice in an inner product

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from strainbench import Problem
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 from strainbench.referee.reference import verify
 
 HALVINGS = 20

@@ -9,9 +9,9 @@ from solvers.newton_ipm.mesh import Change
 from solvers.newton_ipm.sampled import ROUNDING as LOST
 from solvers.newton_ipm.sampled import SampledCones
 from strainbench import Problem
+from strainbench.arrays import FloatArray
 from strainbench.physics.linear import best_linear_solver
 from strainbench.physics.pattern import Pattern
-from strainbench.problem.limits import FloatArray
 from strainbench.referee.reference import objective_floor
 
 FLOOR = 3e-3  # least first slack, in b^2

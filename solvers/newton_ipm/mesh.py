@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.problem.limits import FloatArray
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,9 @@ import numpy as np
 
 from solvers.newton_ipm.mesh import Change, gather, spread, spread_symmetric
 from strainbench import Problem
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
 from strainbench.physics.pattern import Pattern
-from strainbench.problem.limits import FloatArray
 
 ROUNDING = 1e-14
 """Residuals below it count as 0: divided by small slacks, rounding would floor the gap."""

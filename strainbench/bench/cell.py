@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from strainbench.fields import plain, restored
-from strainbench.plugins import find_scenario, find_solver, load_file
 from strainbench.referee.reference import REFERENCE_SOLVER
+from strainbench.scenario.registry import find_scenario, scenarios_of
 from strainbench.scenario.scenario import Scenario
+from strainbench.solver.registry import find_solver, solvers_of
 from strainbench.solver.solver import Solver
 from strainbench.sources import closure, digest, plugin_files, plugin_source
 
@@ -58,14 +59,14 @@ class PluginRef:
         if self.path is None:
             solver = find_solver(self.name)
         else:
-            solver = next(c for c in load_file(self.path, Solver) if c.name == self.name)()
+            solver = next(c for c in solvers_of(self.path) if c.name == self.name)()
         known = [solver.parameters, *solver.variants.values()]
         return replace(solver, **self._settings(type(solver), known))
 
     def scenario(self) -> Scenario:
         """Load it as a scenario; ValueError if its source was edited since."""
         self._check()
-        classes = load_file(self.path, Scenario) if self.path else [find_scenario(self.name)]
+        classes = scenarios_of(self.path) if self.path else [find_scenario(self.name)]
         scenario = next(c for c in classes if c.name == self.name)()
         return replace(scenario, **self._settings(type(scenario), [scenario.parameters]))
 

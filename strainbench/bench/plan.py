@@ -11,7 +11,7 @@ from dataclasses import MISSING, fields, replace
 from itertools import product
 from math import isqrt
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import psutil
 
@@ -19,19 +19,13 @@ from strainbench.bench.cell import Cell, PluginRef, file_named
 from strainbench.fields import SETTABLE, NotSettableError, default_of, hints, read
 from strainbench.fields import words as words_of
 from strainbench.options import MOST, shown
-from strainbench.plugins import (
-    Plugin,
-    UnavailableError,
-    find_scenario,
-    find_solver,
-    list_solvers,
-    load_file,
-    nearest,
-    told,
-)
+from strainbench.plugins import UnavailableError, nearest, told
+from strainbench.scenario.registry import find_scenario, scenarios_of
 from strainbench.scenario.scenario import Scenario, SceneWarning
+from strainbench.solver.registry import find_solver, list_solvers, solvers_of
 from strainbench.solver.solver import Solver, warm_twin
 
+Plugin = TypeVar("Plugin", Solver, Scenario)
 MODES = ("simulate", "replay")
 STARTS = ("cold", "warm")
 BYTES_A_CELL = 472
@@ -69,7 +63,7 @@ def split_values(text: str) -> list[str]:
         return next(csv.reader([text], strict=True))
     except csv.Error as error:
         valid = 'V1,V2 or "V1,V2" for one value with a comma is valid'
-        raise ValueError(f"--set ...={shown(text)}: {valid} ({error})") from None
+        raise ValueError(f"--set ...={text!r}: {valid} ({error})") from None
 
 
 def parse_value(owner: str, key: str, hint: Any, text: str, file: str = "") -> object:
@@ -137,7 +131,7 @@ def plan_scenarios(words: Sequence[str], choices: Choices) -> list[PluginRef]:
     for word in words:
         file = word if is_file(word) else None
         path = str(Path(word).resolve()) if file else None
-        for kind in with_defaults(word, Scenario) if file else [find_scenario(word)]:
+        for kind in with_defaults(word, scenarios_of(word)) if file else [find_scenario(word)]:
             for settings, spelling in combinations(kind, choices, True, file or ""):
                 with blaming(kind.name, file):
                     scene = kind(**settings)
@@ -226,15 +220,14 @@ def never_warm(solvers: Sequence[str]) -> list[str]:
 def from_file(file: str) -> list[Solver]:
     """The solvers of a file, as they are by default."""
     found = []
-    for kind in with_defaults(file, Solver):
+    for kind in with_defaults(file, solvers_of(file)):
         with blaming(kind.name, file):
             found.append(kind())
     return found
 
 
-def with_defaults(file: str, base: type[Plugin]) -> list[type[Plugin]]:
+def with_defaults(file: str, classes: list[type[Plugin]]) -> list[type[Plugin]]:
     """The plug-ins of a file; ValueError names the fields without a default."""
-    classes = load_file(file, base)
     for kind in classes:
         with blaming(kind.name, file):
             bare = ", ".join(f.name for f in fields(kind) if f.init and default_of(f) is MISSING)

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_info
 
+from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
-from strainbench.problem.limits import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import StepReport
 from strainbench.solver.solver import Solution, Solver, run_solver, warm_up

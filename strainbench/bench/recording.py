@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell, PluginRef
 from strainbench.files import locked, open_folder
-from strainbench.plugins import find_solver
-from strainbench.problem.limits import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.referee.reference import REFERENCE_SOLVER
+from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import run_solver
 
 

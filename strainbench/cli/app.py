@@ -37,10 +37,11 @@ from strainbench.cli.listing import tables
 from strainbench.escape import plain, terminal
 from strainbench.files import disk_errors
 from strainbench.options import WrongWordError, number, path, shown, whole
-from strainbench.plugins import list_scenarios, told
+from strainbench.plugins import told
 from strainbench.problem.export import check_format, write_problem
 from strainbench.problem.problem import Problem
 from strainbench.referee.reference import REFERENCE_SOLVER
+from strainbench.scenario.registry import list_scenarios
 from strainbench.scenario.scenario import SceneWarning
 
 app = typer.Typer(

@@ -16,16 +16,10 @@ from strainbench.bench.plan import from_file, is_file, with_defaults
 from strainbench.escape import terminal
 from strainbench.fields import hints, spelled, words
 from strainbench.options import shown
-from strainbench.plugins import (
-    Entry,
-    UnavailableError,
-    find_scenario,
-    find_solver,
-    list_scenarios,
-    list_solvers,
-    nearest,
-)
+from strainbench.plugins import Listed, UnavailableError, nearest
+from strainbench.scenario.registry import find_scenario, list_scenarios, scenarios_of
 from strainbench.scenario.scenario import Scenario
+from strainbench.solver.registry import find_solver, list_solvers
 from strainbench.solver.solver import Solver
 
 FIELD = re.compile(r"(\w+(?:, \w+)*) : ?(.*)")
@@ -86,16 +80,16 @@ def in_file(path: str) -> list[Solver | Scenario]:
     except ValueError as error:
         if "defines no solver" not in str(error):
             raise
-        return [kind() for kind in with_defaults(path, Scenario)]
+        return [kind() for kind in with_defaults(path, scenarios_of(path))]
     try:
-        made += [kind() for kind in with_defaults(path, Scenario)]
+        made += [kind() for kind in with_defaults(path, scenarios_of(path))]
     except ValueError as error:
         if "defines no scenario" not in str(error):
             raise
     return made
 
 
-def overview(title: str, entries: Sequence[Entry]) -> Table:
+def overview(title: str, entries: Sequence[Listed]) -> Table:
     """Name, whether it can be used, and below each other method, paper, why it cannot."""
     table = _table(title)
     table.add_column("name", no_wrap=True)

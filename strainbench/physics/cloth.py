@@ -9,13 +9,13 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.energies.bending import add_bending_gradient, add_bending_hessian, hinges
 from strainbench.physics.energies.contact import Contact, add_blocks
 from strainbench.physics.energies.membrane import add_membrane_gradient, add_membrane_hessian
 from strainbench.physics.linear import LinearSolver, best_linear_solver, symmetric
 from strainbench.physics.pattern import Pattern
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, shape_gradients
+from strainbench.problem.problem import shape_gradients
 
 
 @dataclass(frozen=True)

@@ -30,14 +30,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.linear import NotPositiveDefiniteError
 from strainbench.physics.pattern import scatter
 from strainbench.physics.statics import Equilibrium, potential
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, Problem
+from strainbench.problem.problem import Problem
 
 
 @dataclass(frozen=True)

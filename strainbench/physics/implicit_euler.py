@@ -20,9 +20,9 @@ from time import perf_counter
 
 import numpy as np
 
+from strainbench.arrays import FloatArray
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.linear import LinearSolver, NotPositiveDefiniteError
-from strainbench.problem.limits import FloatArray
 
 GRAVITY = np.array([0.0, -9.81, 0.0])
 """[m/s^2], y is up."""

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
+from strainbench.arrays import FloatArray
 from strainbench.physics.implicit_euler import GRAVITY
-from strainbench.problem.limits import FloatArray
 
 Minimise = Callable[[FloatArray, FloatArray, float, float], FloatArray]
 """(start, inertial, step, time) to the minimum of 1/2 ||x - inertial||_M^2 / step^2 + W(x),

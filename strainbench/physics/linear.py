@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController, threadpool_info
 
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 
 
 class NotPositiveDefiniteError(ArithmeticError):

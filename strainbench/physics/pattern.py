@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
 
 
 @dataclass(frozen=True, eq=False)

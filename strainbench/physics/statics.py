@@ -30,9 +30,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from strainbench.arrays import FloatArray
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import GRAVITY
-from strainbench.problem.limits import FloatArray
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,8 @@ from itertools import repeat
 import numpy as np
 import scipy.sparse as sp
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.conic import ConicForm
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
 
 Lines = Iterator[str]
 

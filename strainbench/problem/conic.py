@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 from strainbench.problem.problem import Problem
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, shape_gradients
+from strainbench.arrays import FloatArray, IntArray
+from strainbench.problem.problem import shape_gradients
 
 
 def square_grid(resolution: int, side: float, diagonals: str) -> tuple[FloatArray, IntArray]:

@@ -13,34 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from strainbench.arrays import FloatArray, frozen_array
 from strainbench.textfile import read_lines
-
-FloatArray = NDArray[np.float64]
 
 SAME_DIRECTION = 1e-9
 """Directions whose unit vectors differ by less than this, up to sign, are one direction."""
-
-
-def frozen_array(name: str, values: ArrayLike, *ndims: int) -> FloatArray:
-    """A read-only float copy of `values`, or ValueError naming the field, index and value."""
-    try:
-        given = np.array(values)
-        if not np.isrealobj(given) or given.dtype.kind in "USO":
-            raise ValueError(f"entries of type {given.dtype}")
-        array = given.astype(np.float64)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"{name}: not an array of real numbers ({error})") from None
-    if array.ndim not in ndims:
-        valid = " or ".join(map(str, ndims))
-        raise ValueError(f"{name}: expected {valid} dimensions, got shape {array.shape}")
-    bad = np.argwhere(~np.isfinite(array))
-    if len(bad):
-        index = tuple(bad[0].tolist())
-        raise ValueError(f"{name}{list(index)} is {array[index]}: every entry must be finite")
-    array.setflags(write=False)
-    return array
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,46 +19,17 @@ from typing import Literal, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import ConvexHull, QhullError
 
-from strainbench.problem.limits import FloatArray, StretchLimits, frozen_array
+from strainbench.arrays import FloatArray, IntArray, frozen_array, index_array, read_only
+from strainbench.problem.limits import StretchLimits
 
-IntArray = NDArray[np.int64]
 Value = TypeVar("Value")
-Scalar = TypeVar("Scalar", np.int64, np.float64)
 
 ROUNDING = 4 * np.finfo(float).eps  # of a unit length
 FLAT = 1e-9  # a hull that is thinner, for its length, tells nothing
-
-
-def _index_array(name: str, values: ArrayLike, ndim: int, vertices: int) -> IntArray:
-    """A read-only copy of vertex indices, or ValueError naming the field, index and value."""
-    try:
-        array = np.array(values)
-    except ValueError as error:
-        raise ValueError(f"{name}: not an array of vertex indices ({error})") from None
-    if array.size == 0:
-        array = array.astype(np.int64)
-    if array.ndim != ndim:
-        raise ValueError(f"{name}: expected {ndim} dimensions, got shape {array.shape}")
-    if not np.issubdtype(array.dtype, np.integer):
-        raise ValueError(f"{name}: vertex indices must be integers, got {array.dtype}")
-    bad = np.argwhere((array < 0) | (array >= vertices))
-    if len(bad):
-        index = tuple(bad[0].tolist())
-        raise ValueError(
-            f"{name}{list(index)} is {array[index]}: valid vertex indices are 0 to {vertices - 1}"
-        )
-    array = array.astype(np.int64)
-    array.setflags(write=False)
-    return array
-
-
-def _read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
-    array.setflags(write=False)
-    return array
 
 
 def rest_corners(rest: FloatArray, elements: IntArray) -> FloatArray:
@@ -94,7 +65,7 @@ def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, F
         )
     inverse = np.linalg.inv(edges)
     gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-    return _read_only(gradients), _read_only(np.abs(determinant) / (2 if dim == 2 else 6))
+    return read_only(gradients), read_only(np.abs(determinant) / (2 if dim == 2 else 6))
 
 
 def _of_mesh(compute: Callable[[Problem], Value]) -> cached_property[Value]:
@@ -168,7 +139,7 @@ class Problem:
         per_corner = self.rest.ndim == 3
         if per_corner:
             put("target", frozen_array("target", self.target, 2))
-        put("elements", _index_array("elements", self.elements, 2, self.vertices))
+        put("elements", index_array("elements", self.elements, 2, self.vertices))
         if per_corner and self.rest.shape[:2] != self.elements.shape:
             raise ValueError(
                 f"rest: shape {self.rest.shape} for elements of shape {self.elements.shape}; "
@@ -208,7 +179,7 @@ class Problem:
         return array
 
     def _checked_pins(self) -> IntArray:
-        pins = _index_array("pinned", self.pinned, 1, self.vertices)
+        pins = index_array("pinned", self.pinned, 1, self.vertices)
         values, counts = np.unique(pins, return_counts=True)
         for vertex in values[counts > 1][:1]:
             second = np.flatnonzero(pins == vertex)[1]
@@ -283,28 +254,28 @@ class Problem:
     @_of_mesh
     def used(self) -> IntArray:
         """Indices of the vertices of the elements."""
-        return _read_only(np.unique(self.elements))
+        return read_only(np.unique(self.elements))
 
     @_of_mesh
     def isolated(self) -> IntArray:
         """Indices of the vertices in no element, and not pinned: their optimum is the target."""
         touched = np.union1d(self.used, self.pinned)
-        return _read_only(np.setdiff1d(np.arange(self.vertices), touched))
+        return read_only(np.setdiff1d(np.arange(self.vertices), touched))
 
     @_of_mesh
     def held(self) -> IntArray:
         """Indices of the vertices that a solver leaves at their target: pinned, or isolated."""
-        return _read_only(np.concatenate([self.pinned, self.isolated]))
+        return read_only(np.concatenate([self.pinned, self.isolated]))
 
     @_of_mesh
     def free(self) -> IntArray:
         """Indices of the vertices that can move: all others."""
-        return _read_only(np.setdiff1d(np.arange(self.vertices), self.held))
+        return read_only(np.setdiff1d(np.arange(self.vertices), self.held))
 
     @_of_mesh
     def weights(self) -> FloatArray:
         """(n,) diagonal of M: the masses, or ones."""
-        return _read_only(np.ones(self.vertices)) if self.mass is None else self.mass
+        return read_only(np.ones(self.vertices)) if self.mass is None else self.mass
 
     @property
     def least_weight(self) -> float:
@@ -336,7 +307,7 @@ class Problem:
         if self.limits.spectral:
             axes = np.atleast_2d(self.limits.bounds)
             per_element = per_element * (axes.min(axis=1, keepdims=True) / axes)[:, :, None]
-        return _read_only(per_element.reshape(self.rows, -1))
+        return read_only(per_element.reshape(self.rows, -1))
 
     @_of_mesh
     def G(self) -> sp.csr_array:  # noqa: N802
@@ -359,7 +330,7 @@ class Problem:
         if self.limits.spectral:
             bounds = bounds.min(axis=-1, keepdims=True)
         shape = (len(self.elements), bounds.shape[-1])
-        return _read_only(np.broadcast_to(bounds, shape).reshape(-1).copy())
+        return read_only(np.broadcast_to(bounds, shape).reshape(-1).copy())
 
     @_of_mesh
     def lower_bounds(self) -> FloatArray:
@@ -367,7 +338,7 @@ class Problem:
         lower = np.zeros(1) if self.limits.lower is None else self.limits.lower
         per_element = self.constraints // len(self.elements)
         shape = (len(self.elements), per_element)
-        return _read_only(np.broadcast_to(lower, shape).reshape(-1).copy())
+        return read_only(np.broadcast_to(lower, shape).reshape(-1).copy())
 
     def stretches(self, positions: FloatArray) -> FloatArray:
         """(constraints,) stretch at `positions` (n, 3): ||(G x)_i||, or ||F D||_2 min(bounds)."""
@@ -441,7 +412,7 @@ class Problem:
     def _reach(self) -> FloatArray:
         """(p, n) an upper bound on the distance of each vertex from each pin [m]."""
         if len(self.pinned) == 0:
-            return _read_only(np.zeros((0, self.vertices)))
+            return read_only(np.zeros((0, self.vertices)))
         edges, lengths = longest_edges(self)
         graph = sp.csr_array((lengths, (edges[:, 0], edges[:, 1])), shape=2 * (self.vertices,))
         reach: FloatArray = dijkstra(graph, directed=False, indices=self.pinned)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.referee.kkt import kkt_residual
 from strainbench.referee.reference import Reference, reference_of, relative

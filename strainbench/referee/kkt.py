@@ -19,8 +19,8 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, Problem
+from strainbench.arrays import FloatArray, IntArray
+from strainbench.problem.problem import Problem
 from strainbench.referee.reference import objective_floor
 
 NEAR = 1e-5

@@ -19,9 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from strainbench.plugins import UnavailableError, find_solver
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
+from strainbench.plugins import UnavailableError
 from strainbench.problem.problem import Problem
+from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, run_solver
 
 REFERENCE_SOLVER = "newton-ipm"

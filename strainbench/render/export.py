@@ -10,8 +10,8 @@ from pathlib import Path
 import meshio
 import numpy as np
 
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, Problem
+from strainbench.arrays import FloatArray, IntArray
+from strainbench.problem.problem import Problem
 from strainbench.render.film import Film, Frame, Track, principal_stretches, untracked
 
 MESH_FORMATS = ("obj", "ply", "vtu")

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.physics.energies.contact import Obstacle
-from strainbench.problem.limits import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import ClothScenario
 from strainbench.solver.solver import Solver, run_solver

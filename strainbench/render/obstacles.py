@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.energies.contact import Floor, Obstacle, Sphere
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
 
 TURNS = 48  # meridians of a sphere: facets that the eye does not see at our size
 TILES = 12  # of a floor, along each side

@@ -20,9 +20,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.escape import chart
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
 from strainbench.render.export import surface
 from strainbench.render.film import Film
 from strainbench.render.obstacles import patches

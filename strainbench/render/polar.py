@@ -14,10 +14,11 @@ from matplotlib.projections.polar import PolarAxes
 from matplotlib.ticker import MaxNLocator
 from scipy.optimize import linprog
 
+from strainbench.arrays import FloatArray
 from strainbench.bench.plan import plan_available
 from strainbench.bench.records import open_folder
 from strainbench.escape import chart
-from strainbench.problem.limits import FloatArray, StretchLimits
+from strainbench.problem.limits import StretchLimits
 from strainbench.problem.problem import Problem
 from strainbench.render.film import Film, Track, shoot, untracked
 from strainbench.report.chart import COLOURS

@@ -15,11 +15,11 @@ from typing import Any
 import pandas as pd
 
 from strainbench import escape
-from strainbench.plugins import find_scenario
 from strainbench.referee.certificate import OUTCOMES
 from strainbench.report.numbers import distance_text
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED, machine_line, power
+from strainbench.scenario.registry import find_scenario
 
 EXPLANATION = """\
 Signs: ✓ optimal on every step (violation at most {violation}, relative gap at most {gap}), or an

@@ -6,8 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
+from strainbench.arrays import FloatArray, IntArray
 
 
 def pattern_stretches(flat: FloatArray, pattern: FloatArray) -> FloatArray:

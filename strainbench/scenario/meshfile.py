@@ -21,8 +21,7 @@ import mapbox_earcut
 import meshio
 import numpy as np
 
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.textfile import read_lines
 
 

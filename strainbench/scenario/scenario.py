@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.fields import same, spelled
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.contact import Contact
@@ -22,8 +23,8 @@ from strainbench.physics.implicit_euler import (
 )
 from strainbench.physics.integrators import INTEGRATORS, Motion
 from strainbench.problem.grid import lumped_areas
-from strainbench.problem.limits import FloatArray, StretchLimits
-from strainbench.problem.problem import IntArray, Problem
+from strainbench.problem.limits import StretchLimits
+from strainbench.problem.problem import Problem
 
 EASY_LIMIT = 0.01  # tighter ones are checked on this one
 FEWEST_STEPS = 10  # of a run that is not told how many

@@ -6,7 +6,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from strainbench.problem.limits import FloatArray
+from strainbench.arrays import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.solver.solver import Solution
 

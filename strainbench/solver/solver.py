@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -11,9 +10,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from strainbench.arrays import FloatArray
 from strainbench.fields import same, spelled
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import FloatArray, StretchLimits
+from strainbench.problem.limits import StretchLimits
 from strainbench.problem.problem import Problem
 
 Watch = Callable[[float, int, FloatArray, FloatArray | None], None]
@@ -251,10 +251,3 @@ def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
         mass=None if problem.mass is None else np.linspace(1.0, 2.0, len(rest)),
     )
     run_solver(solver, toy, solver.prepare(toy), tolerance, time_limit=60.0)
-
-
-def method_and_paper(docstring: str | None) -> tuple[str, str]:
-    """The first line of a docstring, "method (paper)", as its two parts."""
-    line = (docstring or "").strip().split("\n")[0].rstrip(".")
-    match = re.fullmatch(r"(.*?)\s*\((.*)\)", line)
-    return (match[1], match[2]) if match else (line, "")

@@ -22,6 +22,7 @@ import numpy as np
 import pandas as pd
 
 from strainbench import escape
+from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.machine import describe_machine
 from strainbench.bench.records import open_folder, remember_machine
@@ -30,7 +31,6 @@ from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.contact import Contact, Floor
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
 from strainbench.physics.statics import potential
-from strainbench.problem.limits import FloatArray
 from strainbench.referee.reference import reference_of
 from strainbench.render.film import Track, untracked
 from strainbench.scenario.scenario import ClothScenario, Scenario, SheetScenario

@@ -13,7 +13,8 @@ from strainbench.bench.cell import PluginRef
 from strainbench.bench.machine import describe_machine
 from strainbench.bench.plan import plan
 from strainbench.physics.linear import available_linear_solvers
-from strainbench.plugins import find_scenario, find_solver
+from strainbench.scenario.registry import find_scenario
+from strainbench.solver.registry import find_solver
 from strainbench.sources import PACKAGES, ROOT
 
 MINE = """\

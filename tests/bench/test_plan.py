@@ -9,8 +9,9 @@ import pytest
 
 from strainbench.bench.cell import Cell, PluginRef
 from strainbench.bench.plan import never_warm, parse_settings, parse_value, plan, split_values
-from strainbench.plugins import find_scenario, find_solver
+from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.scenario import SceneWarning
+from strainbench.solver.registry import find_solver
 
 SOLVER = '''
 from dataclasses import dataclass

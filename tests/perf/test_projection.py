@@ -8,8 +8,8 @@ import pytest
 
 from scenarios.swing import Swing
 from strainbench import certify
-from strainbench.plugins import find_solver, list_solvers
 from strainbench.referee.reference import REFERENCE_SOLVER
+from strainbench.solver.registry import find_solver, list_solvers
 from strainbench.solver.solver import run_solver, warm_up
 
 TOLERANCE = 1e-6

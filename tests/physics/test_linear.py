@@ -17,7 +17,7 @@ from strainbench.physics.linear import (
     best_linear_solver,
     symmetric,
 )
-from strainbench.plugins import find_solver
+from strainbench.solver.registry import find_solver
 from strainbench.studies.euler import profile, projection, run, table
 
 

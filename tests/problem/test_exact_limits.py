@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from strainbench import Problem, StretchLimits, certify, solve
-from strainbench.plugins import find_solver, list_solvers
 from strainbench.problem.grid import square_grid
+from strainbench.solver.registry import find_solver, list_solvers
 from tests.problem.test_conic import exact
 from tests.problems import random_problem
 

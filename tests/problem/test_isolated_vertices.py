@@ -9,9 +9,9 @@ import pytest
 
 from strainbench import Problem, StretchLimits, certify, solve
 from strainbench.physics.linear import available_linear_solvers
-from strainbench.plugins import find_solver, list_solvers
 from strainbench.referee.kkt import kkt_residual
 from strainbench.referee.reference import objective_floor, reference_of
+from strainbench.solver.registry import find_solver, list_solvers
 from strainbench.solver.solver import run_solver
 from tests.problems import random_problem, stretched_cube
 

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from strainbench import certify, solve
-from strainbench.plugins import find_solver, list_solvers
 from strainbench.referee.reference import objective_floor, reference_of
+from strainbench.solver.registry import find_solver, list_solvers
 from tests.problems import random_problem
 from tests.tally import Tally
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from strainbench import Problem, StretchLimits, certify, solve
-from strainbench.plugins import find_solver, list_solvers
 from strainbench.referee.kkt import kkt_residual
 from strainbench.referee.reference import content_key, reference_of
+from strainbench.solver.registry import find_solver, list_solvers
 from tests.problems import moved, random_problem, rotation
 
 REST = np.array([[0.0, 0.0], [1.0, 0.0], [0.2, 0.8]])

@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from strainbench import certify, solve
-from strainbench.plugins import find_solver, list_solvers
 from strainbench.referee.certificate import OUTCOMES
 from strainbench.referee.reference import objective_floor, reference_of
+from strainbench.solver.registry import find_solver, list_solvers
 from tests.hard_problems import hard_problem
 
 PROBLEMS = 40

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from strainbench import Problem, StretchLimits, certify, solve
-from strainbench.plugins import find_solver
 from strainbench.referee.certificate import OUTCOMES
 from strainbench.referee.reference import Reference, ReferenceSolver, reference_of, verify
+from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, run_solver
 from tests.problems import random_problem, stretched_cube
 

@@ -11,10 +11,11 @@ import pytest
 
 from strainbench import certify, solve
 from strainbench.bench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows
-from strainbench.plugins import find_scenario, find_solver
 from strainbench.problem.grid import lumped_areas
 from strainbench.report import load_runs, write_report
 from strainbench.report.failures import failures
+from strainbench.scenario.registry import find_scenario
+from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import run_solver
 from tests.report.test_report import row
 

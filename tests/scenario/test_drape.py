@@ -12,7 +12,7 @@ from scenarios.drape import SAMPLES, Drape, pleat
 from strainbench import certify
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
 from strainbench.physics.statics import StaticsSettings, balanced, potential
-from strainbench.plugins import find_solver
+from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import run_solver
 
 

@@ -18,8 +18,8 @@ from strainbench import certify, solve
 from strainbench.bench.judge import _missed
 from strainbench.bench.plan import plan
 from strainbench.bench.play import FRAMES
-from strainbench.plugins import find_scenario, list_scenarios
 from strainbench.referee.reference import reference_of
+from strainbench.scenario.registry import find_scenario, list_scenarios
 from strainbench.scenario.scenario import ClothScenario, SheetScenario
 
 NAMES = [e.name for e in list_scenarios()]

@@ -11,7 +11,7 @@ import pytest
 from strainbench import Solution, Solver
 from strainbench.bench.plan import plan_one
 from strainbench.bench.recording import record, record_all, recorded, recorder
-from strainbench.plugins import find_solver
+from strainbench.solver.registry import find_solver
 from strainbench.studies.duel.measure import Entry, duel, parse_frames
 from strainbench.studies.duel.report import CSV_HEADER, HEADER, Outcome, check_ending
 from tests.cli.test_cli import strainbench

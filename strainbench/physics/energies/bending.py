@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
 from strainbench.physics.pattern import scatter
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray, rest_corners
+from strainbench.problem.problem import rest_corners
 
 
 def hinges(rest: FloatArray, elements: IntArray, areas: FloatArray) -> tuple[IntArray, FloatArray]:

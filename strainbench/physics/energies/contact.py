@@ -13,8 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
+from strainbench.arrays import FloatArray, IntArray
 
 UP = np.array([0.0, 1.0, 0.0])
 

@@ -14,10 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
 from strainbench.physics.pattern import scatter
-from strainbench.problem.limits import FloatArray
-from strainbench.problem.problem import IntArray
 
 
 @compiled

@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.isolation import Running
 from strainbench.bench.machine import describe_machine, fixed_threads
@@ -28,7 +29,6 @@ from strainbench.bench.records import (
 )
 from strainbench.files import locked
 from strainbench.problem.export import write_problem
-from strainbench.problem.limits import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.referee.certificate import certify
 from strainbench.referee.reference import content_key, reference_of

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.play import (
     Journal,
@@ -26,7 +27,6 @@ from strainbench.bench.play import (
     with_journal,
 )
 from strainbench.problem.export import load_problem
-from strainbench.problem.limits import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.solver.solver import Solution, run_solver, warm_up
 

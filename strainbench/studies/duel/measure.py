@@ -22,12 +22,12 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from strainbench.arrays import FloatArray
 from strainbench.bench.machine import fixed_threads
 from strainbench.bench.recording import Recording
 from strainbench.options import shown
 from strainbench.physics.linear import best_linear_solver
 from strainbench.physics.pattern import Pattern
-from strainbench.problem.limits import FloatArray
 from strainbench.problem.problem import Problem
 from strainbench.referee.certificate import Certificate, certify
 from strainbench.referee.reference import ReferenceSolver

@@ -8,16 +8,10 @@ import sys
 import pytest
 
 import solvers
-from strainbench import Scenario, Solver
 from strainbench.bench.plan import plan_solvers
-from strainbench.plugins import (
-    UnavailableError,
-    find_scenario,
-    find_solver,
-    list_scenarios,
-    list_solvers,
-    load_file,
-)
+from strainbench.plugins import UnavailableError
+from strainbench.scenario.registry import find_scenario, list_scenarios, scenarios_of
+from strainbench.solver.registry import find_solver, list_solvers, solvers_of
 
 HEAD = """
 from dataclasses import dataclass
@@ -184,7 +178,7 @@ def test_a_solver_may_be_a_folder(planted):
 
 
 def test_a_file_defines_a_solver(tmp_path):
-    (found,) = load_file(write(tmp_path, HEAD + BODY.format(name="mine")), Solver)
+    (found,) = solvers_of(write(tmp_path, HEAD + BODY.format(name="mine")))
     assert found.name == "mine"
     assert found().label == "mine"
 
@@ -192,22 +186,22 @@ def test_a_file_defines_a_solver(tmp_path):
 def test_a_file_may_define_several_and_import_others(tmp_path):
     text = HEAD + "from solvers.none import NoProjection\n" + BODY.format(name="one")
     text += BODY.format(name="two").replace("Mine", "Second")
-    found = load_file(write(tmp_path, text), Solver)
+    found = solvers_of(write(tmp_path, text))
     assert [c.name for c in found] == ["one", "two"]
 
 
 def test_an_edited_file_is_loaded_anew(tmp_path):
     path = write(tmp_path, HEAD + BODY.format(name="mine"))
-    load_file(path, Solver)
+    solvers_of(path)
     write(tmp_path, (HEAD + BODY.format(name="mine")).replace("sweeps: int = 3", "sweeps: int = 4"))
-    (found,) = load_file(path, Solver)
+    (found,) = solvers_of(path)
     assert found().parameters == {"sweeps": 4}
 
 
 def test_two_files_of_one_name_do_not_mix(tmp_path):
     one = write(tmp_path, HEAD + BODY.format(name="one"), "a/mine.py")
     two = write(tmp_path, HEAD + BODY.format(name="two"), "b/mine.py")
-    (first,), (second,) = load_file(one, Solver), load_file(two, Solver)
+    (first,), (second,) = solvers_of(one), solvers_of(two)
     assert first.name == "one"
     assert second.name == "two"
     assert first.__module__ != second.__module__
@@ -232,35 +226,35 @@ def test_two_files_of_one_name_do_not_mix(tmp_path):
 def test_a_file_that_is_no_solver_is_one_line(tmp_path, text, words):
     path = write(tmp_path, text)
     with pytest.raises(ValueError, match=words) as caught:
-        load_file(path, Solver)
+        solvers_of(path)
     assert path in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"mine\.py: no such file"):
-        load_file(str(tmp_path / "mine.py"), Solver)
+        solvers_of(str(tmp_path / "mine.py"))
 
 
 def test_a_folder_is_no_file(tmp_path):
     with pytest.raises(ValueError, match="no such file"):
-        load_file(str(tmp_path), Solver)
+        solvers_of(str(tmp_path))
 
 
 def test_a_file_that_is_no_python_is_named(tmp_path):
     path = write(tmp_path, "name: mine", "mine.yaml")
     with pytest.raises(ValueError, match=r"mine\.yaml: not a Python file"):
-        load_file(path, Solver)
+        solvers_of(path)
 
 
 def test_a_solver_is_no_scenario(tmp_path):
     path = write(tmp_path, HEAD + BODY.format(name="mine"))
     with pytest.raises(ValueError, match=r"defines no scenario: a subclass of strainbench\.Scenar"):
-        load_file(path, Scenario)
+        scenarios_of(path)
 
 
 def test_a_file_that_failed_leaves_no_module_behind(tmp_path):
     before = set(sys.modules)
     with pytest.raises(ValueError, match="does not import"):
-        load_file(write(tmp_path, "1 / 0"), Solver)
+        solvers_of(write(tmp_path, "1 / 0"))
     assert {m for m in set(sys.modules) - before if m.startswith("strainbench_file")} == set()

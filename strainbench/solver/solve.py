@@ -8,8 +8,8 @@ from time import perf_counter
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from strainbench.plugins import find_solver
 from strainbench.problem.problem import Problem
+from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, Watch, check_threads, run_solver, warm_up
 
 
