@@ -1,8 +1,6 @@
-"""Where a step of implicit Euler spends its time: `strainbench.studies.euler`."""
+"""The old name of `strainbench.studies.euler`: where a step of implicit Euler spends its time."""
 
-import typer
-
-from strainbench.studies.euler import run
+import runpy
 
 if __name__ == "__main__":
-    typer.run(run)
+    runpy.run_module("strainbench.studies.euler", run_name="__main__")

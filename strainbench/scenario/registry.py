@@ -8,8 +8,8 @@ from strainbench.scenario.scenario import Scenario
 
 def list_scenarios() -> list[Listed]:
     """Every scenario."""
-    classes = [c for s in stems("scenarios") for c in classes(load("scenarios", s), Scenario)]
-    return [Listed(c.name, *method_and_paper(c.__doc__)) for c in classes]
+    found = [c for s in stems("scenarios") for c in classes(load("scenarios", s), Scenario)]
+    return [Listed(c.name, *method_and_paper(c.__doc__)) for c in found]
 
 
 def find_scenario(name: str) -> type[Scenario]:
