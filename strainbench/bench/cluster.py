@@ -24,6 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from strainbench.bench.cell import Cell
+from strainbench.bench.ending import Ending
 from strainbench.bench.judge import identity
 from strainbench.bench.play import in_words
 from strainbench.bench.process import OUTPUT
@@ -77,7 +78,7 @@ def run_on_cluster(
         for future in _as_completed(futures, client, address, observer):
             cell = futures[future]
             if failure := future.exception():
-                reason = f"the worker failed: {in_words(failure)}"
+                reason = f"{Ending.LOST}: {in_words(failure)}"
                 row = {"steps_done": 0, "outcome": "no answer", "reason": reason}
                 home.write(cell, identity(cell) | row, [])
             else:

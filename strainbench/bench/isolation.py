@@ -12,6 +12,7 @@ from typing import Any
 import psutil
 
 from strainbench.bench.cell import Cell
+from strainbench.bench.ending import Ending
 from strainbench.bench.play import EVENTS, GO, Task, play, read_journal
 from strainbench.bench.process import Child, Family
 
@@ -20,8 +21,8 @@ WARM_UP_LIMIT = 20.0  # [s] at least, compilation apart; the time limit where th
 GRACE = 2.0  # [s] after the time limit in which a solver may stop by itself
 EXIT_GRACE = 2.0  # [s] from a cell's last word to the end of its process
 FAMILY_SECONDS = 0.25  # [s] between two looks at the memory of what a cell has started
+BEFORE = "before its first projection"
 CLOCK_SLACK = 3.0  # [s] by which a line of a journal may come late on a busy machine
-TAMPERED = "the clock was tampered with"
 
 
 @dataclass
@@ -132,17 +133,19 @@ class Running:
         warming = self._seen("warming")
         if self.released is not None:
             if limit is not None and now - self.released > limit + GRACE:
-                return f"time limit of {limit:g} s"
+                return f"{Ending.TIME_LIMIT} of {limit:g} s"
         elif self._when("ready") is not None:
             pass  # it waits for us
         elif warming is None:
             if now - self.scheduled > START_LIMIT:
-                return f"hung for {START_LIMIT:g} s as it was loaded, before its first projection"
+                return f"{Ending.HUNG} for {START_LIMIT:g} s as it was loaded, {BEFORE}"
         else:
             longest = START_LIMIT if limit is None else max(limit, WARM_UP_LIMIT)
             compiling = self._compile_seconds(now)
             if now - warming - min(compiling, START_LIMIT) > longest:
-                return f"hung for {longest:g} s in its warm-up, before its first projection"
+                return (
+                    f"{Ending.HUNG} for {longest:g} s in its warm-up, before its first projection"
+                )
         return self._memory_reached(now)
 
     def _compile_seconds(self, now: float) -> float:
@@ -152,11 +155,11 @@ class Running:
 
     def _memory_reached(self, now: float) -> str:
         if _resident_mb(self.child.process.pid) > self.memory_limit_mb:
-            return f"memory limit of {self.memory_limit_mb:g} MB"
+            return f"{Ending.MEMORY_LIMIT} of {self.memory_limit_mb:g} MB"
         if now - self._counted > FAMILY_SECONDS:
             self._counted = now
             if _family_mb(self.child.process.pid) > self.memory_limit_mb:
-                return f"memory limit of {self.memory_limit_mb:g} MB, with what it started"
+                return f"{Ending.MEMORY_LIMIT} of {self.memory_limit_mb:g} MB, with what it started"
         return ""
 
     def _clock_lies(self) -> str:
@@ -169,7 +172,7 @@ class Running:
             if not before - CLOCK_SLACK < event["at"] < after + CLOCK_SLACK:
                 inside, outside = event["at"] - started, max(0.0, before - first)
                 return (
-                    f"{TAMPERED}: it says {inside:.1f} s, "
+                    f"{Ending.TAMPERED}: it says {inside:.1f} s, "
                     f"from outside it took {outside:.1f} s at least"
                 )
         return ""
@@ -181,7 +184,7 @@ def crashed(code: int) -> str:
     if code < 0:
         with suppress(ValueError):  # a signal without a name
             word = f" ({signal.Signals(-code).name})"
-    return f"crashed: its process ended with exit code {code}{word}"
+    return f"{Ending.CRASHED}: its process ended with exit code {code}{word}"
 
 
 def _resident_mb(pid: int) -> float:

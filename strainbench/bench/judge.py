@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from strainbench.bench.cell import Cell, PluginRef
-from strainbench.bench.isolation import TAMPERED
+from strainbench.bench.ending import Ending
 from strainbench.bench.play import in_words, read_events, read_frames, read_journal
 from strainbench.bench.records import SCHEMA
 from strainbench.referee.certificate import OUTCOMES, Certificate, certify
@@ -89,7 +89,7 @@ def judge(cell: Cell, folder: Path, ending: str, kept: Kept | None = None) -> Ve
     rows = _step_rows(cell, events, projections, certificates)
     in_time = len(_in_time(cell, events))
     if in_time < len(projections):  # what came back late is no answer, nor is its step done
-        ending = ending or f"time limit of {cell.time_limit:g} s"
+        ending = ending or f"{Ending.TIME_LIMIT} of {cell.time_limit:g} s"
         late = projections[in_time]["step"]
         events = [e for e in events if e["event"] != "step" or e["step"] < late]
     counted, steps = certificates[:in_time], _steps_done(events)
@@ -105,7 +105,7 @@ def unjudged(cell: Cell, folder: Path, ending: str, failure: str) -> Verdict:
     """The rows of a cell on which the referee failed: what was measured, and no verdict."""
     events = read_events(folder)
     projections = [e for e in events if e["event"] == "projection"]
-    reason = f"the referee failed: {failure} ({_steps_done(events)} of {cell.steps} steps)"
+    reason = f"{Ending.UNJUDGED}: {failure} ({_steps_done(events)} of {cell.steps} steps)"
     if ending:
         reason += f"; before that, {ending}"
     row = _run_row(cell, events, projections, [], ending)
@@ -255,7 +255,7 @@ def _false_claim(events: list[dict[str, Any]]) -> str:
     took = sum(e["end"] - e["begin"] for e in projections)
     if took - said < CLAIM_SLACK + CLAIM_SHARE * took:
         return ""
-    return f"{TAMPERED}: solves of {said:.2f} s by its account took {took:.2f} s"
+    return f"{Ending.TAMPERED}: solves of {said:.2f} s by its account took {took:.2f} s"
 
 
 def _cut_off(cell: Cell, events: list[dict[str, Any]], ending: str) -> list[float]:
@@ -263,7 +263,7 @@ def _cut_off(cell: Cell, events: list[dict[str, Any]], ending: str) -> list[floa
     last = next(
         (e for e in reversed(events) if e["event"] in ("setup", "step", "projection")), None
     )
-    if last is None or cell.time_limit is None or not ending.startswith("time limit"):
+    if last is None or cell.time_limit is None or Ending.of(ending) is not Ending.TIME_LIMIT:
         return []
     begun = next((e["at"] for e in events if e["event"] == "started"), last["at"])
     rest = begun + cell.time_limit - last["at"]
@@ -326,9 +326,9 @@ def _outcome(
     failures = [e["reason"] for e in events if e["event"] == "failed"]
     reasons = []
     ending = ending or _false_claim(events)
-    if steps_done < cell.steps or ending.startswith(TAMPERED):
+    if steps_done < cell.steps or Ending.of(ending) is Ending.TAMPERED:
         outcome = "no answer"
-        cause = ending or (failures[0] if failures else "the process ended without a word")
+        cause = ending or (failures[0] if failures else Ending.SILENT)
         reasons.append(f"{cause} ({steps_done} of {cell.steps} steps)")
     else:
         outcome = max((c.outcome for c in certificates), key=OUTCOMES.index)

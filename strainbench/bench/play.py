@@ -25,6 +25,7 @@ from threadpoolctl import threadpool_info
 
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
+from strainbench.bench.ending import Ending
 from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import StepReport
 from strainbench.solver.solver import Solution, Solver, run_solver, warm_up
@@ -106,7 +107,7 @@ def read_journal(folder: Path) -> tuple[list[dict[str, Any]], str]:
         except (ValueError, RecursionError):
             sound = False
         if not sound:
-            return events, f"the journal is damaged at line {number}"
+            return events, f"{Ending.DAMAGED} at line {number}"
         events.append(event)
     return events, ""
 
@@ -204,7 +205,7 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
     )
     start_warming(journal)
     if refusal := solver.supports(problem):
-        raise Stop(f"unsupported: {refusal}")
+        raise Stop(f"{Ending.UNSUPPORTED}: {refusal}")
     warm_up(solver, problem, cell.tolerance)
     if recording is None:
         scenario.warm_up()
@@ -321,7 +322,7 @@ class _Table:
         """End the cell at its limit."""
         remaining = self.remaining()
         if remaining is not None and remaining <= 0:
-            raise Stop(f"time limit of {self.cell.time_limit:g} s")
+            raise Stop(f"{Ending.TIME_LIMIT} of {self.cell.time_limit:g} s")
 
     def project(self, target: FloatArray) -> FloatArray:
         """Limit one candidate; an answer that is not usable ends the cell."""

@@ -21,6 +21,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from strainbench.bench.cell import Cell
+from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running, crashed
 from strainbench.bench.judge import (
     CASE,
@@ -41,7 +42,6 @@ from strainbench.files import locked, uninterrupted
 from strainbench.referee.reference import REFERENCE_SOLVER
 
 POLL_SECONDS = 0.02
-UNAVAILABLE = ("unavailable", "the worker failed")
 LAST_GRACE = 3.0  # [s] for the referee to decide the open case when a run is interrupted
 
 
@@ -135,11 +135,12 @@ class Runner:
         limit below the one given now.
         """
         row = self._finished.get(cell.key)
-        if row is None or self.settings.rerun or row["reason"].startswith(UNAVAILABLE):
+        if row is None or self.settings.rerun:
             return False
-        if row["reason"].startswith("time limit"):
+        ending = Ending.of(row["reason"])
+        if ending is Ending.TIME_LIMIT:
             return cell.time_limit is not None and cell.time_limit <= float(row["time_limit"])
-        return True
+        return ending is None or not ending.passing
 
     def run(self, cells: Sequence[Cell]) -> Summary:
         """Run what is not finished; KeyboardInterrupt passes through, with all results kept."""
@@ -207,9 +208,9 @@ class Runner:
         """Whether a cell ends before it begins, as a row with the reason."""
         reason = ""
         if cell.solver.unavailable:
-            reason = f"unavailable: {cell.solver.unavailable}"
+            reason = f"{Ending.UNAVAILABLE}: {cell.solver.unavailable}"
         elif cell.mode == "replay" and not self._recording(cell).exists():
-            reason = f"the frames to replay could not be recorded with {REFERENCE_SOLVER}"
+            reason = f"{Ending.UNRECORDED} with {REFERENCE_SOLVER}"
         if reason:
             row = identity(cell) | {"steps_done": 0, "outcome": "no answer", "reason": reason}
             self.write(cell, row, [])
@@ -253,7 +254,7 @@ class Case:
     def failure(self, referee: Child) -> str:
         """Why the referee will not decide it, or ""."""
         if (code := referee.exit_code) is not None:
-            return crashed(code).removeprefix("crashed: ")
+            return crashed(code).removeprefix(f"{Ending.CRASHED}: ")
         path = self.item.folder / JUDGED
         judged = path.stat().st_size if path.exists() else 0
         if judged != self.judged:

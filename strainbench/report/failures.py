@@ -15,6 +15,7 @@ from typing import Any
 import pandas as pd
 
 from strainbench import escape
+from strainbench.bench.ending import Ending
 from strainbench.referee.certificate import OUTCOMES
 from strainbench.report.numbers import distance_text
 from strainbench.report.steps import newest_steps
@@ -64,7 +65,7 @@ def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
         )
         infeasible = rows["reason"].str.contains("projections: infeasible:", regex=False).any()
         for _, row in rows[rows["solver"] != UNCONSTRAINED].iterrows():
-            if row["reason"].startswith("unavailable"):
+            if Ending.of(row["reason"]) is Ending.UNAVAILABLE:
                 continue
             status = says.get((row["cell"], row["outcome"]), "")
             sign, found = _judge_infeasible(row, status) if infeasible else _judge(row, status)
@@ -137,7 +138,7 @@ def _judge_infeasible(row: pd.Series, status: str) -> tuple[str, str]:
 
 def _verdict(row: pd.Series, easier: pd.Series | None, apart: str) -> str:
     """Whose failure it is, as far as the easier neighbour tells."""
-    if row["reason"].startswith("unsupported"):
+    if Ending.of(row["reason"]) is Ending.UNSUPPORTED:
         return "refused"
     if easier is None:
         return f"not run at {apart}"

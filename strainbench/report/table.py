@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from strainbench import escape
+from strainbench.bench.ending import Ending
 from strainbench.report import warm
 from strainbench.report.names import digits_of
 from strainbench.report.numbers import distance_text, seconds_text
@@ -87,7 +88,8 @@ def groups(runs: pd.DataFrame) -> Iterator[Group]:
 def mark(row: pd.Series) -> str:
     """ "-" for no usable answer, "*" for some steps not converged, else nothing."""
     cut_off = row["steps_done"] < row["steps_asked"]
-    if cut_off and (row["steps_done"] == 0 or not row["reason"].startswith("time limit")):
+    by_clock = Ending.of(row["reason"]) is Ending.TIME_LIMIT
+    if cut_off and (row["steps_done"] == 0 or not by_clock):
         return "-"
     return "*" if cut_off or row["projections_violated"] > 0 else ""
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
+from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running
 from strainbench.bench.machine import describe_machine, fixed_threads
 from strainbench.bench.play import read_events, read_frames
@@ -196,7 +197,7 @@ def _measured(frame: Frame, item: Running, events: list[dict[str, Any]]) -> Rows
 def _ending(cell: Cell, item: Running | None, events: dict[str, dict[str, Any]]) -> str:
     """Why a cell ended, in words."""
     if item is None:
-        return f"unavailable: {cell.solver.unavailable}"
+        return f"{Ending.UNAVAILABLE}: {cell.solver.unavailable}"
     failure = item.ending or events.get("failed", {}).get("reason")
     status = events.get("answer", {}).get("status")
-    return failure or (f"it says {status!r}" if status else "the process ended without a word")
+    return failure or (f"it says {status!r}" if status else Ending.SILENT)

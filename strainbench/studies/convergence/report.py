@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from strainbench import escape
+from strainbench.bench.ending import Ending
 from strainbench.bench.records import WORDS, RecordsError, read_machines, read_rows
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
 from strainbench.report.table import machine_line, power
@@ -73,7 +74,7 @@ def reached(rows: pd.DataFrame, measure: str, level: float) -> pd.Series | None:
 def unreached(rows: pd.DataFrame) -> str:
     """Why a solver's samples do not reach a level: its budget, itself, or what stopped it."""
     first = rows.iloc[0]
-    if first["ending"].startswith("time limit"):
+    if Ending.of(first["ending"]) is Ending.TIME_LIMIT:
         return f"not within {first['time_limit']:g} s"
     return "never" if first["ending"].startswith("it says") else "-"
 

@@ -18,6 +18,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
+from strainbench.bench.ending import Ending
 from strainbench.bench.play import (
     Journal,
     Stop,
@@ -48,7 +49,7 @@ def _trace(cell: Cell, folder: Path, journal: Journal, problem: Problem) -> None
     solver = cell.solver.solver()
     start_warming(journal)
     if refusal := solver.supports(problem):
-        raise Stop(f"unsupported: {refusal}")
+        raise Stop(f"{Ending.UNSUPPORTED}: {refusal}")
     warm_up(solver, problem, cell.tolerance)
     wait_for_go(folder, journal)
     begin = journal.clock()
@@ -56,7 +57,7 @@ def _trace(cell: Cell, folder: Path, journal: Journal, problem: Problem) -> None
     journal.write("setup", seconds=journal.clock() - begin)
 
     limit = np.inf if cell.time_limit is None else cell.time_limit
-    over = Stop(f"time limit of {limit:g} s")
+    over = Stop(f"{Ending.TIME_LIMIT} of {limit:g} s")
     left = limit - (journal.clock() - begin)
     looser = tolerances(cell.tolerance)
     while looser:
