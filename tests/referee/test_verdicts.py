@@ -210,11 +210,13 @@ def test_another_solver_is_asked_where_one_fails(solvers):
     assert reference_of(square()).failure is None
 
 
-def test_a_failure_is_not_kept(solvers, tmp_path):
-    problem = square()
+def test_a_failure_that_is_kept_says_so_again(solvers):
+    problem, kept = square(), {}
     solvers(Failing())
-    assert ReferenceSolver(problem, tmp_path)(problem).failure
-    assert not list(tmp_path.iterdir())
+    first = ReferenceSolver(problem, kept)(problem).failure
+    assert first
+    solvers()
+    assert ReferenceSolver(problem, kept)(problem).failure == first
 
 
 def test_a_feasible_target_needs_no_reference(solvers):
