@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
+"""Doubles."""
 IntArray = NDArray[np.int64]
+"""Indices, 64 bits wide."""
 Scalar = TypeVar("Scalar", np.int64, np.float64)
 
 

@@ -78,7 +78,8 @@ def _draw_group(group: Group, style: dict[str, dict[str, Any]], stem: Path) -> l
     for (limit, mesh), rows in runs.groupby(["bound", "mesh"], sort=False):
         ax = axes[limits.index(limit), meshes.index(mesh)]
         _panel(ax, rows, style, top)
-        ax.set_title(f"{cells(mesh)}, {limit} limit" if limit else cells(mesh), size=10)
+        title = f"{cells(mesh)}, {limit} limit" if limit else cells(mesh)
+        ax.set_title(escape.chart(title), size=10)
     for row in axes:
         row[0].set_ylabel("distance to optimum [mm]")
     for ax in axes[-1]:
@@ -126,7 +127,14 @@ def _panel(ax: Axes, rows: pd.DataFrame, style: dict[str, dict[str, Any]], top: 
     unknown = rows[rows["distance_max"].isna() & (rows["outcome"] != "no answer")]
     if len(unknown):
         names = wrap(f"no distance known: {', '.join(unknown['solver'])}", 48)
-        ax.text(0.02, 0.02, "\n".join(names), transform=ax.transAxes, size=7, color="#555555")
+        ax.text(
+            0.02,
+            0.02,
+            "\n".join(map(escape.chart, names)),
+            transform=ax.transAxes,
+            size=7,
+            color="#555555",
+        )
 
 
 def draw_certified(ax: Axes, x: float, row: pd.Series, colour: str) -> None:

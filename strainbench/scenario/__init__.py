@@ -1,5 +1,3 @@
 """What a scene is: its mesh, limits, pins, physics, and nothing that it does not need."""
 
-from strainbench.scenario.scenario import Scenario
-
-__all__ = ["Scenario"]
+from strainbench.scenario.scenario import Scenario as Scenario
