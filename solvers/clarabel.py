@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.conic import ConicForm
 from strainbench.limits import FloatArray
-from strainbench.reference import objective_floor
+from strainbench.reference import claimed, objective_floor
 
 CONES = {
     "second-order": clarabel.SecondOrderConeT,
@@ -113,12 +113,13 @@ class Clarabel(Solver):
         positions = state.positions(problem, np.array(result.x))
         if "Infeasible" in status:
             positions[:] = np.nan
-        return Solution(
+        found = Solution(
             positions,
             "solved" if status == "Solved" else status,
             result.iterations,
             state.multipliers(np.array(result.z)),
         )
+        return claimed(problem, found, tolerance)
 
 
 UNSCALED = 1e-2
