@@ -113,12 +113,13 @@ class Clarabel(Solver):
         positions = state.positions(problem, np.array(result.x))
         if "Infeasible" in status:
             positions[:] = np.nan
-        return Solution(
+        found = Solution(
             positions,
             "solved" if status == "Solved" else status,
             result.iterations,
             state.multipliers(np.array(result.z)),
         )
+        return claimed(problem, found, tolerance)
 
 
 UNSCALED = 1e-2

@@ -107,7 +107,18 @@ class Ipopt(Solver):
         monitor: Callable[..., None],
         deadline: Clock,
     ) -> Solution:
-        """One run of Ipopt."""
+        """One run of Ipopt, and what its "solved" is worth."""
+        found = self._run(problem, state, tolerance, monitor, deadline)
+        return claimed(problem, found, tolerance)
+
+    def _run(
+        self,
+        problem: Problem,
+        state: Memory[Structure],
+        tolerance: float,
+        monitor: Callable[..., None],
+        deadline: Clock,
+    ) -> Solution:
         unit, scale = self._units(problem)
         nlp = Callbacks(problem, state.mesh, unit, scale, monitor, deadline)
         positions, Y = state.start(problem)

@@ -78,8 +78,6 @@ class IpoptEdges(Ipopt):
         deadline: Clock,
     ) -> Solution:
         """One run of Ipopt; its multipliers belong to other constraints than the problem's."""
-        found = super().solve(
-            problem, state, tolerance=tolerance, monitor=monitor, deadline=deadline
-        )
+        found = self._run(problem, state, tolerance, monitor, deadline)
         status = "solved for edge lengths" if found.status == "solved" else found.status
         return replace(found, status=status, multipliers=None)

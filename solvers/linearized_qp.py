@@ -36,6 +36,7 @@ from strainbench.referee.reference import objective_floor, verify
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
 
+REFUSED = "refused by OSQP"
 ITERATIONS = 1000
 RHO = 100.0
 FORCING = 0.1
@@ -51,6 +52,7 @@ class LinearizedQP(Solver):
     |---|---|
     | solved | the violation of x and its gap above the dual value of Y are below the tolerance |
     | primal infeasible | OSQP finds no point within the linearised limits |
+    | refused by OSQP | the numbers are too large for it |
     | step limit | neither, after `max_steps` |
     | time limit | neither, at the deadline |
 
@@ -87,6 +89,7 @@ class LinearizedQP(Solver):
         G = sp.csr_array(sp.kron(problem.G[:, problem.free], sp.eye_array(3)))
         return Memory(G, self.warm)
 
+    @np.errstate(all="ignore")  # what overflows is not finite, and refused
     def solve(
         self,
         problem: Problem,
@@ -112,6 +115,8 @@ class LinearizedQP(Solver):
         for step in range(1, self.max_steps + 1):
             status = steps.take(tolerance, deadline)
             monitor(steps.x.copy(), steps.Y)
+            if status == REFUSED:
+                return Solution(steps.x, status, step, steps.Y)
             if "infeasible" in status:
                 steps.x[steps.problem.free] = np.nan
                 return Solution(steps.x, status, step)
@@ -165,7 +170,10 @@ class Steps:
         options = self._options(tolerance, deadline)
         below = np.full(len(room), -np.inf)
         upper = sp.csc_matrix(sp.triu(P))
-        qp.setup(upper, q, sp.csc_matrix(along @ self.G), below, room, verbose=False, **options)
+        try:
+            qp.setup(upper, q, sp.csc_matrix(along @ self.G), below, room, verbose=False, **options)
+        except osqp.OSQPException:  # of what is not finite, or beyond the 1e30 that it takes for so
+            return REFUSED
         qp.warm_start(x=old, y=self.l)
         result = qp.solve(raise_error=False)
         if "infeasible" not in result.info.status:

@@ -73,7 +73,8 @@ class Qoco(Solver):
         result = solver.solve()
         status = "solved" if result.status == "QOCO_SOLVED" else result.status
         positions = state.positions(problem, np.array(result.x))
-        return Solution(positions, status, result.iters, state.multipliers(np.array(result.z)))
+        Y = state.multipliers(np.array(result.z))
+        return claimed(problem, Solution(positions, status, result.iters, Y), tolerance)
 
 
 def set_up(form: ConicForm, problem: Problem) -> Any:

@@ -95,7 +95,7 @@ class Cvxpy(Solver):
             options |= accuracy_options(self.backend, tolerance)
         status, seconds = state.run(problem, options)
         positions[problem.free] += state.displacement()
-        return Solution(
+        found = Solution(
             positions,
             "solved" if status == cp.OPTIMAL else status,
             state.iterations(),
@@ -105,3 +105,4 @@ class Cvxpy(Solver):
                 "canonicalisation_seconds": perf_counter() - start - seconds,
             },
         )
+        return claimed(problem, found, tolerance)

@@ -117,6 +117,7 @@ multipliers have no bound, and the referee's may price a violation higher than t
         """Sparsity, ordering and symbolic factorisation; None where there is nothing to move."""
         return State(problem) if len(problem.free) else None
 
+    @np.errstate(all="ignore")  # what overflows is not finite, and no step forward
     def solve(
         self,
         problem: Problem,

@@ -87,14 +87,29 @@ def local(problem: Problem, positions: FloatArray) -> Reference:
 
 
 def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> Reference:
-    """Bounds that hold whatever the positions (n, 3) and multipliers (rows, 3) are.
-
-    Y is scaled by the factor that makes D largest: D = lin^2 / 2 q with
-    lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its own rounding. Where
-    a number overflows, D is 0.
-    """
+    """Bounds that hold whatever the positions (n, 3) and multipliers (rows, 3) are."""
     if not problem.convex:
         return local(problem, positions)
+    lower_bound, norms = dual_bound(problem, multipliers)
+    infeasible = problem.infeasible_pins()
+    if infeasible is None and lower_bound > problem.largest_objective:
+        infeasible = "infeasible: the dual bound exceeds the objective of any point within limits"
+    feasible = bool(np.all(np.isfinite(positions))) and not np.any(problem.violations(positions))
+    if not feasible:
+        nothing = np.full_like(problem.target, np.nan)
+        return Reference(nothing, norms, lower_bound, np.inf, 0, infeasible)
+    gap = max(0.0, problem.objective(positions) - lower_bound)
+    error = np.sqrt(2 * gap / problem.least_weight)
+    active = int(np.sum(problem.stretches(positions) > problem.bounds - ACTIVE))
+    return Reference(positions, norms, lower_bound, float(error), active, infeasible)
+
+
+def dual_bound(problem: Problem, multipliers: FloatArray) -> tuple[float, FloatArray]:
+    """The best D(Y) of any multiple Y of `multipliers` (rows, 3), and its |Y_i| (constraints,).
+
+    D = lin^2 / 2 q with lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its
+    own rounding. Where a number overflows, D is 0.
+    """
     Y = np.where(np.isfinite(multipliers), multipliers, 0.0)
     Y /= np.max(np.abs(Y), initial=0.0) or 1.0  # or the squares of small ones would vanish
     norms = problem.dual_norms(Y)
@@ -109,17 +124,30 @@ def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> 
     lower_bound = 0.5 * linear * scale
     if not np.isfinite(lower_bound):
         scale, lower_bound = 0.0, 0.0
-    infeasible = problem.infeasible_pins()
-    if infeasible is None and lower_bound > problem.largest_objective:
-        infeasible = "infeasible: the dual bound exceeds the objective of any point within limits"
-    feasible = bool(np.all(np.isfinite(positions))) and not np.any(problem.violations(positions))
-    if not feasible:
-        nothing = np.full_like(problem.target, np.nan)
-        return Reference(nothing, scale * norms, lower_bound, np.inf, 0, infeasible)
-    gap = max(0.0, problem.objective(positions) - lower_bound)
-    error = np.sqrt(2 * gap / problem.least_weight)
-    active = int(np.sum(problem.stretches(positions) > problem.bounds - ACTIVE))
-    return Reference(positions, scale * norms, lower_bound, float(error), active, infeasible)
+    return lower_bound, scale * norms
+
+
+@np.errstate(all="ignore")  # what overflows is not within the tolerance
+def claimed(problem: Problem, solution: Solution, tolerance: float) -> Solution:
+    """A solver's answer, whose "solved" is kept where the answer itself bears it out.
+
+    Violation and relative gap are computed as the referee does, but with the answer's own
+    multipliers; without any, or where lower bounds leave no bound, the violation counts alone.
+    """
+    if solution.status != "solved":
+        return solution
+    x, Y = solution.positions, solution.multipliers
+    violations = problem.violations(x)
+    worst, gap = float(np.max(violations)), 0.0
+    if problem.convex and Y is not None:
+        lower_bound, norms = dual_bound(problem, Y)
+        above = problem.objective(x) + float(norms @ violations) - lower_bound
+        gap = relative(problem, above, lower_bound)
+    if not worst <= tolerance:
+        return replace(solution, status=f"inaccurate: violation {worst:.1e}")
+    if not gap <= tolerance:
+        return replace(solution, status=f"inaccurate: gap {gap:.1e}")
+    return solution
 
 
 class ReferenceSolver:
