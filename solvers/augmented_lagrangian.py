@@ -33,7 +33,6 @@ import numpy as np
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.referee.reference import objective_floor
 from strainbench.solver.memory import Memory
 
 DECREASE, HALVINGS = 1e-4, 20
@@ -156,7 +155,7 @@ class AugmentedLagrangian(Solver):
         """Updates from any x (n, 3) and multipliers (rows, 3)."""
         Y = multipliers.reshape(problem.constraints, -1, 3)
         penalty, last, steps = self.penalty, np.inf, 0
-        floor = objective_floor(problem)
+        floor = problem.objective_floor
         for updates in range(self.max_updates + 1):
             violation, gap = judge(problem, G, x, Y.reshape(-1, 3))  # 5
             allowed = tolerance * max(problem.objective(x) - gap, floor)

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.problem.conic import ConicForm
-from strainbench.referee.reference import objective_floor
+from strainbench.solver.claim import claimed
 
 CONES = {
     "second-order": clarabel.SecondOrderConeT,
@@ -145,7 +145,7 @@ class QuadraticForm:
         """The least scale of a gap, in the solver's units."""
         if self.scaling is None:
             return UNSCALED
-        return min(1.0, self.form.scale * objective_floor(problem))
+        return min(1.0, self.form.scale * problem.objective_floor)
 
     def vectors(self, problem: Problem) -> tuple[FloatArray, FloatArray]:
         """No linear objective, and the cones' constants."""

@@ -40,7 +40,6 @@ import numpy as np
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.referee.reference import objective_floor
 from strainbench.solver.memory import Memory
 
 ROWS_A_CHUNK = 1_000_000
@@ -152,7 +151,7 @@ class Dykstra(Solver):
     ) -> Solution:
         """Sweeps from any multipliers (rows, 3)."""
         frame, run = start(problem, G, multipliers)
-        floor, done, mark = objective_floor(problem), 0, 2
+        floor, done, mark = problem.objective_floor, 0, 2
         chunk = max(2, ROWS_A_CHUNK // problem.rows)
         while True:
             violation, gap, objective = judge(G, frame, run)  # 5

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.solver.claim import claimed
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
 

@@ -32,7 +32,7 @@ import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
-from strainbench.referee.reference import objective_floor, verify
+from strainbench.problem.dual import dual_bound
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
 
@@ -201,7 +201,7 @@ class Steps:
     def converged(self, tolerance: float) -> bool:
         """Whether the violation, and the gap relative to the dual value of Y, are below it."""
         problem, violations = self.problem, self.problem.violations(self.x)
-        lower = verify(problem, self.x, self.Y).lower_bound
+        lower, _ = dual_bound(problem, self.Y)
         gap = problem.objective(self.x) + problem.dual_norms(self.Y) @ violations - lower
-        limit = tolerance * max(lower, objective_floor(problem))
+        limit = tolerance * max(lower, problem.objective_floor)
         return bool(violations.max() < tolerance and gap < limit)

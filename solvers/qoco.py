@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.problem.conic import ConicForm
+from strainbench.solver.claim import claimed
 from strainbench.solver.solver import held_still
 
 

@@ -31,7 +31,6 @@ from solvers.admm.anderson import Anderson
 from solvers.admm.rows import Rows
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
-from strainbench.referee.reference import objective_floor
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
 
@@ -198,7 +197,7 @@ class Iteration:
         lower = 0.5 * linear**2 / quadratic if linear > 0 else 0.0
         priced = float(np.sum(self._norms(Y) * violation))
         gap = problem.objective(self.x) + priced - lower
-        return gap <= 0.5 * tolerance * max(lower, objective_floor(problem))
+        return gap <= 0.5 * tolerance * max(lower, problem.objective_floor)
 
     def _norms(self, rows: FloatArray) -> FloatArray:
         """(constraints,) of (rows, 3), over all entries."""

@@ -17,6 +17,7 @@ from solvers.cvxpy.backends import (
 )
 from solvers.cvxpy.model import Model
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench.solver.claim import claimed
 from strainbench.solver.solver import held_still
 
 

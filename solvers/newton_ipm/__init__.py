@@ -71,7 +71,7 @@ from solvers.newton_ipm.sampled import ROUNDING
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import NotPositiveDefiniteError
-from strainbench.referee.reference import objective_floor, verify
+from strainbench.problem.dual import dual_bound
 
 PATIENCE = 25  # iterations after which a warm start is given up
 WIDTHS = 2e-8, 1e-10, 1e-12, 1e-13  # of wider limits; below, slacks are rounding
@@ -229,12 +229,12 @@ def worth(problem: Problem, solution: Solution) -> float:
 
     Being below the optimum does not set off violations here: other multipliers price them higher.
     """
-    x, nowhere = solution.positions, np.full_like(problem.target, np.nan)
     assert solution.multipliers is not None
-    found, violations = verify(problem, nowhere, solution.multipliers), problem.violations(x)
-    scale = max(found.lower_bound, objective_floor(problem))
-    price = STRICTER * float(found.multiplier_norms @ np.maximum(violations - 2 * ROUNDING, 0.0))
-    gap = (abs(problem.objective(x) - found.lower_bound) + price) / scale
+    x, violations = solution.positions, problem.violations(solution.positions)
+    lower_bound, norms = dual_bound(problem, solution.multipliers)
+    price = STRICTER * float(norms @ np.maximum(violations - 2 * ROUNDING, 0.0))
+    scale = max(lower_bound, problem.objective_floor)
+    gap = (abs(problem.objective(x) - lower_bound) + price) / scale
     return max(STRICTER * float(violations.max()), gap)
 
 

@@ -12,7 +12,6 @@ from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import best_linear_solver
 from strainbench.physics.pattern import Pattern
-from strainbench.referee.reference import objective_floor
 
 FLOOR = 3e-3  # least first slack, in b^2
 FIRST_MU = 50.0  # times the guess of the optimum's objective
@@ -64,7 +63,7 @@ class Iterate:
         self.problem, self.state, self.cones = problem, state, state.cones
         self.keep = keep
         self.target, self.weights = problem.target, problem.weights[:, None]
-        self.free, self.floor = problem.free, objective_floor(problem)
+        self.free, self.floor = problem.free, problem.objective_floor
         self.infeasible = False
         self.x = problem.target
         self.cones.place(problem.bounds, self.x)

@@ -287,6 +287,12 @@ class Problem:
         """Mean weight of the elements' vertices."""
         return float(self.weights[self.used].mean())
 
+    @property
+    def objective_floor(self) -> float:
+        """Half a squared correction of 1e-3 mean edges a vertex: the least scale of a gap."""
+        correction = 1e-3 * self.edge_length
+        return 0.5 * float(np.sum(self.weights[self.free])) * correction * correction
+
     @_of_mesh
     def edge_length(self) -> float:
         """Mean rest length of the elements' edges [m]: the problem's own length unit."""

@@ -27,9 +27,10 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from strainbench.arrays import FloatArray
+from strainbench.problem.dual import relative
 from strainbench.problem.problem import Problem
 from strainbench.referee.kkt import kkt_residual
-from strainbench.referee.reference import Reference, reference_of, relative
+from strainbench.referee.reference import Reference, reference_of
 from strainbench.solver.solver import check_threads
 
 OUTCOMES = ("optimal", "feasible", "violated", "no answer")

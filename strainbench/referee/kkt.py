@@ -21,7 +21,6 @@ import scipy.sparse as sp
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.problem import Problem
-from strainbench.referee.reference import objective_floor
 
 NEAR = 1e-5
 """Limits this close to their bound count as active. Interior-point answers at a tolerance of 1e-6
@@ -50,7 +49,7 @@ def kkt_residual(problem: Problem, positions: FloatArray) -> float:
         return 0.0
     root = np.sqrt(problem.weights[movable, None])
     force = (root * (positions - problem.target)[movable]).T.ravel()
-    scale = max(float(np.linalg.norm(force)), float(np.sqrt(2 * objective_floor(problem))))
+    scale = max(float(np.linalg.norm(force)), float(np.sqrt(2 * problem.objective_floor)))
     if scale == 0:  # the floor of tiny problems underflows
         return 0.0
     normals = _active_normals(problem, positions, movable)

@@ -21,6 +21,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray
 from strainbench.plugins import UnavailableError
+from strainbench.problem.dual import dual_bound, relative
 from strainbench.problem.problem import Problem
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, run_solver
@@ -62,20 +63,6 @@ class Reference:
     failure: str | None = None
 
 
-def objective_floor(problem: Problem) -> float:
-    """Half a squared correction of 1e-3 mean edges a vertex: the least scale of a relative gap."""
-    correction = 1e-3 * problem.edge_length
-    return 0.5 * float(np.sum(problem.weights[problem.free])) * correction * correction
-
-
-def relative(problem: Problem, gap: float, lower_bound: float) -> float:
-    """A gap relative to the lower bound, or to the floor where that is larger."""
-    scale = max(lower_bound, objective_floor(problem))
-    if gap <= 0:
-        return 0.0
-    return gap / scale if 0 < scale < np.inf else float("inf")
-
-
 def local(problem: Problem, positions: FloatArray) -> Reference:
     """Of a problem that is not convex: nothing is known of other points."""
     stretches = problem.stretches(positions)
@@ -102,52 +89,6 @@ def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> 
     error = np.sqrt(2 * gap / problem.least_weight)
     active = int(np.sum(problem.stretches(positions) > problem.bounds - ACTIVE))
     return Reference(positions, norms, lower_bound, float(error), active, infeasible)
-
-
-def dual_bound(problem: Problem, multipliers: FloatArray) -> tuple[float, FloatArray]:
-    """The best D(Y) of any multiple Y of `multipliers` (rows, 3), and its |Y_i| (constraints,).
-
-    D = lin^2 / 2 q with lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its
-    own rounding. Where a number overflows, D is 0.
-    """
-    Y = np.where(np.isfinite(multipliers), multipliers, 0.0)
-    Y /= np.max(np.abs(Y), initial=0.0) or 1.0  # or the squares of small ones would vanish
-    norms = problem.dual_norms(Y)
-    products = np.sum((Y * (problem.G @ problem.target)).reshape(len(norms), -1), axis=1)
-    terms = products - problem.bounds * norms
-    back = (problem.G.T @ Y)[problem.free]
-    q = float(np.sum(back**2 / problem.weights[problem.free, None]))
-    rounding = 16 * np.finfo(float).eps * 2 * float(np.sum(problem.bounds * norms))
-    linear = float(np.sum(terms) - rounding)
-    with np.errstate(all="ignore"):
-        scale = float(np.divide(linear, q)) if linear > 0 else 0.0
-    lower_bound = 0.5 * linear * scale
-    if not np.isfinite(lower_bound):
-        scale, lower_bound = 0.0, 0.0
-    return lower_bound, scale * norms
-
-
-@np.errstate(all="ignore")  # what overflows is not within the tolerance
-def claimed(problem: Problem, solution: Solution, tolerance: float) -> Solution:
-    """A solver's answer, whose "solved" is kept where the answer itself bears it out.
-
-    Violation and relative gap are computed as the referee does, but with the answer's own
-    multipliers; without any, or where lower bounds leave no bound, the violation counts alone.
-    """
-    if solution.status != "solved":
-        return solution
-    x, Y = solution.positions, solution.multipliers
-    violations = problem.violations(x)
-    worst, gap = float(np.max(violations)), 0.0
-    if problem.convex and Y is not None:
-        lower_bound, norms = dual_bound(problem, Y)
-        above = problem.objective(x) + float(norms @ violations) - lower_bound
-        gap = relative(problem, above, lower_bound)
-    if not worst <= tolerance:
-        return replace(solution, status=f"inaccurate: violation {worst:.1e}")
-    if not gap <= tolerance:
-        return replace(solution, status=f"inaccurate: gap {gap:.1e}")
-    return solution
 
 
 class ReferenceSolver:

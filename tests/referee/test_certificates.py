@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from strainbench import certify, solve
-from strainbench.referee.reference import objective_floor, reference_of
+from strainbench.referee.reference import reference_of
 from strainbench.solver.registry import find_solver, list_solvers
 from tests.problems import random_problem
 from tests.tally import Tally
@@ -43,7 +43,7 @@ def contradictions(name, problem, reference, x, found):
     if found.outcome == "optimal":
         violation = problem.violations(x).max()
         above = found.objective - problem.objective(reference.positions)
-        scale = max(reference.lower_bound, objective_floor(problem))
+        scale = max(reference.lower_bound, problem.objective_floor)
         if not (violation <= VIOLATION and above <= GAP * scale + rounding):
             yield f"{name}: called optimal, violated by {violation}, {above} above the reference"
 

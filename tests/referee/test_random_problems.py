@@ -10,7 +10,7 @@ import pytest
 
 from strainbench import certify, solve
 from strainbench.referee.certificate import OUTCOMES
-from strainbench.referee.reference import objective_floor, reference_of
+from strainbench.referee.reference import reference_of
 from strainbench.solver.registry import find_solver, list_solvers
 from tests.hard_problems import hard_problem
 
@@ -52,7 +52,7 @@ def falsehoods(problem, reference, answers):
 
 def contradictions(problem, reference, answers):
     """Bounds and certificates that another answer's objective disproves."""
-    floor = objective_floor(problem)
+    floor = problem.objective_floor
     feasible = [c.objective for _, _, c in answers.values() if c.max_violation == 0]
     best = min(feasible, default=np.inf)
     if not best >= reference.lower_bound * (1 - 1e-12):
