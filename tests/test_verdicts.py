@@ -10,6 +10,7 @@ from strainbench.discovery import find_solver
 from strainbench.referee import OUTCOMES
 from strainbench.reference import Reference, ReferenceSolver, reference_of, verify
 from strainbench.solver import Solution, Solver, run_solver
+from tests.hard_problems import hard_problem
 from tests.problems import random_problem, stretched_cube
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -208,11 +209,23 @@ def test_another_solver_is_asked_where_one_fails(solvers):
     assert reference_of(square()).failure is None
 
 
-def test_a_failure_is_not_kept(solvers, tmp_path):
-    problem = square()
+@pytest.mark.parametrize("seed", [120, 1639, 1851, 1909])
+def test_an_optimum_is_found_where_the_limits_are_far_from_the_target(seed):
+    """The first two solvers stall, or take the limits for ones that cannot be met."""
+    problem = hard_problem(np.random.default_rng([2026, seed]))
+    reference = reference_of(problem)
+    assert reference.failure is None
+    answer = solve(problem, "clarabel")
+    assert answer.status == "solved"
+    assert certify(problem, answer.positions, reference=reference).outcome == "optimal"
+
+
+def test_a_failure_that_is_kept_is_said_again(solvers):
+    problem, kept = square(), {}
     solvers(Failing())
-    assert ReferenceSolver(problem, tmp_path)(problem).failure
-    assert not list(tmp_path.iterdir())
+    first, second = (ReferenceSolver(problem, kept)(problem).failure for _ in range(2))
+    assert first
+    assert second == first
 
 
 def test_a_feasible_target_needs_no_reference(solvers):
