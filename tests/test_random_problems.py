@@ -14,7 +14,7 @@ from strainbench.referee import OUTCOMES
 from strainbench.reference import objective_floor, reference_of
 from tests.hard_problems import hard_problem
 
-PROBLEMS, QUICK = 40, 8
+PROBLEMS, QUICK = 40, 4
 CERTIFIED = ("newton-ipm", "clarabel")
 LIMITS_ALONE = ("fast-projection", "gauss-seidel", "xpbd")
 """Their "solved" is of a point within the limits, the others' of the optimum."""

@@ -209,13 +209,15 @@ def test_another_solver_is_asked_where_one_fails(solvers):
     assert reference_of(square()).failure is None
 
 
-@pytest.mark.parametrize("seed", [120, 1639, 1851, 1909])
-def test_an_optimum_is_found_where_the_limits_are_far_from_the_target(seed):
-    """The first two solvers stall, or take the limits for ones that cannot be met."""
+@pytest.mark.parametrize(
+    ("seed", "name"), [(k, "clarabel") for k in (120, 1639, 1851, 1909)] + [(714, "cvxpy-default")]
+)
+def test_an_optimum_is_found_where_the_first_solvers_fail(seed, name):
+    """They stall, or take limits far from the target for ones that cannot be met."""
     problem = hard_problem(np.random.default_rng([2026, seed]))
     reference = reference_of(problem)
     assert reference.failure is None
-    answer = solve(problem, "clarabel")
+    answer = solve(problem, name)
     assert answer.status == "solved"
     assert certify(problem, answer.positions, reference=reference).outcome == "optimal"
 
