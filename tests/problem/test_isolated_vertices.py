@@ -58,6 +58,7 @@ def test_it_does_not_count_as_free(kind, pinned):
     assert larger.largest_objective == pytest.approx(problem.largest_objective)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sampled", "exact", "volume"])
 @pytest.mark.parametrize("name", SOLVERS)
 def test_every_solver_leaves_it_at_its_target(name, kind):
@@ -84,6 +85,7 @@ def test_newton_ipm_with_each_linear_solver(linear, monkeypatch):
     assert np.allclose(found.positions[old], solve(problem, "newton-ipm").positions, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_warm_start_leaves_it_at_its_target():
     larger, _ = with_isolated(KINDS["sampled"]())
     for name in SOLVERS:
@@ -142,6 +144,7 @@ def test_moving_it_is_no_local_optimum():
     assert "no local optimum" in certify(problem, moved).reason
 
 
+@pytest.mark.slow
 def test_all_others_may_be_pinned():
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [9.0, 9.0]])
     target = np.column_stack([square, np.ones(4)])

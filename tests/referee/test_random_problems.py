@@ -14,7 +14,7 @@ from strainbench.referee.reference import reference_of
 from strainbench.solver.registry import find_solver, list_solvers
 from tests.hard_problems import hard_problem
 
-PROBLEMS, QUICK = 40, 8
+PROBLEMS, QUICK = 40, 4
 CERTIFIED = ("newton-ipm", "clarabel")
 LIMITS_ALONE = ("fast-projection", "gauss-seidel", "xpbd")
 """Their "solved" is of a point within the limits, the others' of the optimum."""

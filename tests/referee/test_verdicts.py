@@ -10,6 +10,7 @@ from strainbench.referee.certificate import OUTCOMES
 from strainbench.referee.reference import Reference, ReferenceSolver, reference_of, verify
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, run_solver
+from tests.hard_problems import hard_problem
 from tests.problems import random_problem, stretched_cube
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -208,6 +209,19 @@ def test_bounds_without_a_reference_still_hold(solvers):
 def test_another_solver_is_asked_where_one_fails(solvers):
     solvers(Failing(), find_solver("clarabel-tight"))
     assert reference_of(square()).failure is None
+
+
+@pytest.mark.parametrize(
+    ("seed", "name"), [(k, "clarabel") for k in (120, 1639, 1851, 1909)] + [(714, "cvxpy-default")]
+)
+def test_an_optimum_is_found_where_the_first_solvers_fail(seed, name):
+    """They stall, or take limits far from the target for ones that cannot be met."""
+    problem = hard_problem(np.random.default_rng([2026, seed]))
+    reference = reference_of(problem)
+    assert reference.failure is None
+    answer = solve(problem, name)
+    assert answer.status == "solved"
+    assert certify(problem, answer.positions, reference=reference).outcome == "optimal"
 
 
 def test_a_failure_that_is_kept_says_so_again(solvers):
