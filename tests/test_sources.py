@@ -67,8 +67,10 @@ def test_packages_from_elsewhere_are_left_out(write, tmp_path):
 
 def test_the_suite_is_followed_where_it_is_asked_for(write):
     mine = write("mine.py", "from strainbench import Solver\nfrom solvers.none import Unlimited")
-    assert SUITE / "solver.py" in closure(mine)
-    assert SUITE / "referee.py" not in closure(mine)  # the package only passes Solver on
+    assert SUITE / "solver" / "solver.py" in closure(mine)
+    assert SUITE / "referee" / "certificate.py" not in closure(
+        mine
+    )  # the package only passes Solver on
     assert closure(mine, suite=False) == sorted([mine, ROOT / "solvers" / "none.py"])
 
 

@@ -306,8 +306,9 @@ class Court:
                 item, self._open = self._open.item, None
                 self._settle(item, *verdict)
         if self._waiting and self._open is None and may_open:
-            self._open = Case(self._waiting.popleft())
-            self._hand_over(self._open.item)
+            item = self._waiting.popleft()
+            self._hand_over(item)
+            self._open = Case(item)
 
     def _hand_over(self, item: Running) -> None:
         """Give a case to the referee's process, which is started if there is none."""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from strainbench import isolation, judge
+from strainbench.bench import isolation, judge
 from strainbench.bench.plan import from_file, plan
 from strainbench.bench.records import STEP_COLUMNS, STEPS, latest_runs, read_rows
 from strainbench.bench.runner import Observer, Runner, Settings
