@@ -7,7 +7,10 @@ import pytest
 
 from tests.tally import Tally
 
-RUNNING = {"test_runner", "test_cluster", "test_cli", "test_converge", "test_readme"}
+RUNNING = {
+    *("test_runner", "test_cluster", "test_endings", "test_files"),
+    *("test_cli", "test_converge", "test_duel", "test_readme"),
+}
 TALLY = pytest.StashKey[Tally]()
 
 
@@ -23,8 +26,8 @@ def pytest_addoption(parser):
         "--kills",
         type=int,
         metavar="N",
-        default=2,
-        help="end runs at N random moments by each signal, twice as often by kill -9; by default 2",
+        default=1,
+        help="end runs at N random moments by each signal; by default one",
     )
 
 
@@ -32,11 +35,13 @@ def pytest_configure(config):
     config.stash[TALLY] = Tally()
 
 
+@pytest.hookimpl(tryfirst=True)  # xdist looks for groups after that
 def pytest_collection_modifyitems(items):
-    """Tests that start runs of their own go one after the other, in one of xdist's processes."""
+    """Tests that start runs of their own are slow, and go one after the other in one process."""
     for item in items:
         if item.path.stem in RUNNING:
             item.add_marker(pytest.mark.xdist_group("runs"))
+            item.add_marker(pytest.mark.slow)
 
 
 def pytest_terminal_summary(terminalreporter, config):
