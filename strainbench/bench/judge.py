@@ -94,7 +94,8 @@ def judge(cell: Cell, folder: Path, ending: str, kept: Kept | None = None) -> Ve
         events = [e for e in events if e["event"] != "step" or e["step"] < late]
     counted, steps = certificates[:in_time], _steps_done(events)
     outcome, reason = _outcome(cell, events, counted, steps, ending or damage)
-    missed = _missed(cell.scenario.scenario(), folder, len(projections), steps)
+    whole = steps == cell.steps  # of one that was cut short nothing is to be expected
+    missed = _missed(cell.scenario.scenario(), folder, len(projections), steps) if whole else []
     row = _run_row(cell, events, projections, counted, ending)
     row |= {"outcome": outcome, "reason": "; ".join(filter(None, [reason, *missed]))}
     row["judge_seconds"] = time.perf_counter() - begin
