@@ -11,6 +11,15 @@ RUNNING = {
     *("test_runner", "test_cluster", "test_endings", "test_files"),
     *("test_cli", "test_converge", "test_duel", "test_readme"),
 }
+LONG = {
+    *("test_every_solver", "test_every_scenario", "test_certificates", "test_random_problems"),
+    *("test_isolated_vertices", "test_exact_limits", "test_directions", "test_export", "test_kkt"),
+    *("test_verdicts", "test_threads", "test_claim", "test_scenes", "test_drape", "test_garment"),
+    *("test_physics", "test_integrators", "test_equilibrium", "test_contact", "test_linear"),
+    *("test_render", "test_report", "test_failures", "test_compare", "test_ledger", "test_escape"),
+    *("test_examples", "test_docs", "test_compiled", "test_options", "test_identity"),
+}
+"""Files whose tests take more than some ten seconds together; all of solvers/ do."""
 TALLY = pytest.StashKey[Tally]()
 
 
@@ -37,10 +46,11 @@ def pytest_configure(config):
 
 @pytest.hookimpl(tryfirst=True)  # xdist looks for groups after that
 def pytest_collection_modifyitems(items):
-    """Tests that start runs of their own are slow, and go one after the other in one process."""
+    """Tests that start runs of their own go one after the other, in one of xdist's processes."""
     for item in items:
         if item.path.stem in RUNNING:
             item.add_marker(pytest.mark.xdist_group("runs"))
+        if item.path.stem in RUNNING | LONG or item.path.parent.name == "solvers":
             item.add_marker(pytest.mark.slow)
 
 
