@@ -19,8 +19,9 @@ MARKDOWN = (
     (re.compile(r"<"), "&lt;"),
     (re.compile(r"(?<![^\W_])_|_(?![^\W_])"), r"\\_"),  # within a word it is no emphasis
     (re.compile(r"\](?=[(:\[])"), r"\\]"),  # a link's; other brackets are plain
-    (re.compile(r"^([#>=\[]|[+-](?=\s|--))"), r"\\\1"),  # what would begin a heading, an item,
+    (re.compile(r"^([#>=\[]|[+-](?=\s|-))"), r"\\\1"),  # what would begin a heading, an item,
     (re.compile(r"^(\d+)([.)])(?=\s|$)"), r"\1\\\2"),  # or a numbered one
+    (re.compile(r"(?<=\s)(#+)$"), r"\\\1"),  # what would end a heading
 )
 LATEX = str.maketrans(
     {

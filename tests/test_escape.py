@@ -12,7 +12,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from matplotlib.figure import Figure
@@ -75,6 +75,8 @@ def test_a_markdown_cell_reads_as_the_text(words):
     assert cells == [escape.plain(words), "end"]
 
 
+@example("--")
+@example("a #")
 @given(text)
 def test_a_markdown_item_and_heading_read_as_the_text(words):
     plain = escape.plain(words)
