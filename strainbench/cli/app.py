@@ -7,7 +7,7 @@ import shlex
 import signal
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from io import TextIOWrapper
 from pathlib import Path
@@ -16,15 +16,6 @@ from typing import Annotated, TextIO
 import psutil
 import typer
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from strainbench import __version__
 from strainbench.bench.cell import Cell
@@ -32,8 +23,20 @@ from strainbench.bench.machine import describe_machine, fixed_threads
 from strainbench.bench.plan import never_warm, plan, plan_one, plan_scene
 from strainbench.bench.recording import record, record_all, recorded, recorder
 from strainbench.bench.records import DiskError, open_folder
-from strainbench.bench.runner import Observer, Runner, Settings, Summary
+from strainbench.bench.runner import Runner, Settings
+from strainbench.cli.display import Display, console, errors, print_summary, progress, say
 from strainbench.cli.listing import tables
+from strainbench.cli.options import (
+    AllSolvers,
+    Folder,
+    FrameNumber,
+    OneScenario,
+    SolversValues,
+    Steps,
+    TableFile,
+    Tolerance,
+    Values,
+)
 from strainbench.escape import plain, terminal
 from strainbench.files import disk_errors
 from strainbench.options import WrongWordError, number, path, shown, whole
@@ -49,7 +52,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Benchmark strain-limiting solvers for cloth: same scenes, one referee.",
 )
-console = Console()
 DEFAULT_RESULTS = Path("results/local/run")
 DEFAULT_LEDGER = Path("results/local/ledger")
 DEFAULT_PICTURES = Path("results/local/pictures")
@@ -63,33 +65,6 @@ VERBS = (
     *("list", "run", "report", "compare", "converge"),
     *("duel", "export", "ledger", "render", "polar"),
 )
-errors = Console(stderr=True, soft_wrap=True, highlight=False)
-
-
-Folder = Annotated[
-    Path,
-    typer.Option(
-        "--results", parser=path("--results"), metavar="DIR", help="folder of the results"
-    ),
-]
-Tolerance = Annotated[
-    float,
-    typer.Option(
-        "--tolerance", parser=number("--tolerance"), metavar="X", help="aimed at by every solver"
-    ),
-]
-Steps = Annotated[
-    int, typer.Option("--steps", parser=whole("--steps"), metavar="N", help="time steps")
-]
-FrameNumber = Annotated[
-    int,
-    typer.Option(
-        "--frame",
-        parser=whole("--frame"),
-        metavar="K",
-        help="which projection, the first being 1",
-    ),
-]
 
 
 class TerminatedError(BaseException):
@@ -102,11 +77,6 @@ class InterruptedRunError(Exception):
     def __init__(self, cause: BaseException, kept: str) -> None:
         super().__init__(kept)
         self.status = TERMINATED if isinstance(cause, TerminatedError) else INTERRUPTED
-
-
-def say(line: object, on: Console = console) -> None:
-    """Print a line as it is: what looks like markup in it is text."""
-    on.print(terminal(line), soft_wrap=True)
 
 
 @app.callback(invoke_without_command=True)
@@ -138,10 +108,7 @@ def list_(
 @app.command()
 def run(
     scenarios: Annotated[list[str], typer.Argument(help="scenario names, or paths of .py files")],
-    solver: Annotated[
-        list[str] | None,
-        typer.Option(help="name, comma-separated names, path of a .py file, or all (default)"),
-    ] = None,
+    solver: AllSolvers = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", help="KEY=V1,V2 of the scenario, or SOLVER.KEY=V1,V2"),
@@ -241,7 +208,7 @@ def run(
             summary = Runner(settings, display).run(cells)
     except (KeyboardInterrupt, TerminatedError) as end:
         raise InterruptedRunError(end, display.kept(len(cells))) from None
-    _print_summary(summary, len(cells), results)
+    print_summary(summary, len(cells), results)
 
 
 def _numbers(text: str) -> list[float]:
@@ -270,16 +237,7 @@ def report(
 def compare(
     first: Annotated[Path, typer.Argument(parser=path("A"), help="folder of results, A")],
     second: Annotated[Path, typer.Argument(parser=path("B"), help="folder of results, B")],
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            parser=path("-o", "a .csv or .md file"),
-            metavar="FILE",
-            help="a .csv or .md file to write too",
-        ),
-    ] = None,
+    output: TableFile = None,
 ) -> None:
     """Compare two folders of results, cell by cell: ratios of times, changes in outcome."""
     from strainbench.report import compare as comparing  # pandas only where needed
@@ -297,12 +255,9 @@ def compare(
 
 @app.command()
 def render(
-    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    scenario: OneScenario,
     solver: Annotated[str, typer.Option(help="name, or path of a .py file")] = "clarabel",
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
-    ] = None,
+    set_: Values = None,
     steps: Steps = 30,
     every: Annotated[
         int, typer.Option(parser=whole("--every"), metavar="K", help="keep each K-th step")
@@ -325,7 +280,7 @@ def render(
 
     top = None if scale is None else pictures.parse_scale(scale)
     view = pictures.parse_camera(camera)
-    with _bar() as bar:
+    with progress() as bar:
         lines = pictures.render(
             scenario,
             solver,
@@ -345,14 +300,11 @@ def render(
 
 @app.command()
 def polar(
-    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    scenario: OneScenario,
     solver: Annotated[
         str, typer.Option(help="name, comma-separated names, or a path")
     ] = "clarabel",
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
-    ] = None,
+    set_: Values = None,
     steps: Annotated[
         int,
         typer.Option(
@@ -374,7 +326,7 @@ def polar(
     """Draw the limits over the material angle, and the strains a scene ends with."""
     from strainbench.render.polar import polar as draw  # matplotlib only where needed
 
-    with _bar() as bar:
+    with progress() as bar:
         lines = draw(
             scenario,
             solver,
@@ -390,7 +342,7 @@ def polar(
 
 @app.command()
 def export(
-    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    scenario: OneScenario,
     frame: FrameNumber,
     output: Annotated[
         Path,
@@ -409,10 +361,7 @@ def export(
     solver: Annotated[
         str, typer.Option(help="answers the projections before; name, or path of a .py file")
     ] = REFERENCE_SOLVER,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
-    ] = None,
+    set_: Values = None,
     tolerance: Tolerance = 1e-6,
 ) -> None:
     """Write one projection of a scene as a conic instance (CBF) or as arrays (npz)."""
@@ -433,16 +382,10 @@ def export(
 
 @app.command("converge")
 def converge_(
-    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    scenario: OneScenario,
     frame: FrameNumber,
-    solver: Annotated[
-        list[str] | None,
-        typer.Option(help="name, comma-separated names, path of a .py file, or all (default)"),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
-    ] = None,
+    solver: AllSolvers = None,
+    set_: SolversValues = None,
     tolerance: Annotated[
         float,
         typer.Option(
@@ -474,7 +417,7 @@ def converge_(
     memory = 0.75 * psutil.virtual_memory().total / 1024**2
     kept = 0
     try:
-        with _bar() as bar:
+        with progress() as bar:
             ended = converge(cells, problem, frame, results, memory)
             for cell, ending in bar.track(ended, len(cells), description="solvers"):
                 say(f"{cell.solver.label}: {ending}", bar.console)
@@ -488,31 +431,28 @@ def converge_(
 
 def _record(cell: Cell, frame: int) -> Problem:
     """A projection of a scene, with a progress bar on the way there."""
-    with _playing(cell, frame) as progress:
-        return record(cell, frame, progress)
+    with _playing(cell, frame) as asked:
+        return record(cell, frame, asked)
 
 
 @contextmanager
 def _playing(cell: Cell, frame: int) -> Iterator[Callable[[int], None]]:
     """What shows how many projections a scene has asked for, on its way to `frame`."""
-    with _bar() as bar:
+    with progress() as bar:
         task = bar.add_task(plain(f"playing {cell.title}"), total=max(frame - 1, 1))
         yield lambda asked: bar.update(task, completed=asked - 1)
 
 
 @app.command("duel")
 def duel_(
-    scenario: Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")],
+    scenario: OneScenario,
     frame: Annotated[
         str, typer.Option(help="projections, the first being 1: 5,10 apart, 14-29 in sequence")
     ],
     solver: Annotated[
         list[str], typer.Option(help="name, comma-separated names, path of a .py file")
     ],
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
-    ] = None,
+    set_: SolversValues = None,
     repeats: Annotated[
         int,
         typer.Option(
@@ -534,16 +474,7 @@ def duel_(
         Path,
         typer.Option(parser=path("--results"), metavar="DIR", help="folder that keeps the frames"),
     ] = DEFAULT_DUEL,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            parser=path("-o", "a .csv or .md file"),
-            metavar="FILE",
-            help="a .csv or .md file to write too",
-        ),
-    ] = None,
+    output: TableFile = None,
 ) -> None:
     """Let solvers take turns on the same projections: ratios of times in one run."""
     from strainbench.studies.duel.measure import duel, parse_frames
@@ -560,13 +491,13 @@ def duel_(
             raise ValueError(cell.solver.unavailable)
     machine, about = describe_machine(threads=1)
     fed = recorder(cells[0])
-    with fixed_threads(1), _playing(fed, last) as progress:
+    with fixed_threads(1), _playing(fed, last) as asked:
         if units:  # whose steps are to be timed now
-            recording = record_all(fed, last, progress)
+            recording = record_all(fed, last, asked)
         else:
-            recording = recorded(fed, last, results / "frames", progress)
+            recording = recorded(fed, last, results / "frames", asked)
     turns = repeats * sum(map(len, sequences)) * len(solvers)
-    with _bar() as bar:
+    with progress() as bar:
         task = bar.add_task("projections", total=turns)
         entries = duel(
             solvers,
@@ -606,7 +537,7 @@ def ledger(
 
     names = scenarios or [entry.name for entry in list_scenarios()]
     cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
-    with _bar() as bar:
+    with progress() as bar:
         written = accounts.write_ledger(
             cells,
             results,
@@ -614,105 +545,6 @@ def ledger(
         )
     for file in written:
         say(f"wrote {file}")
-
-
-def _bar() -> Progress:
-    """A progress bar with what is done and the time it takes."""
-    return Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        BarColumn(bar_width=24),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("gone,"),
-        TimeRemainingColumn(),
-        TextColumn("left"),
-        console=console,
-    )
-
-
-class Display(Observer):
-    """A progress bar over all steps, with what is running, and a line for each ended cell."""
-
-    def __init__(self) -> None:
-        self.progress = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description}", markup=False),
-            BarColumn(bar_width=24),
-            MofNCompleteColumn(),
-            TextColumn("steps,"),
-            TimeElapsedColumn(),
-            TextColumn("gone,"),
-            TimeRemainingColumn(),
-            TextColumn("left"),
-            console=console,
-        )
-        self.running: dict[str, int] = {}
-        self.done = self.finished = 0
-
-    def __enter__(self) -> Display:
-        self.progress.start()
-        self.task = self.progress.add_task("starting", total=None)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.progress.stop()
-
-    def planned(self, cells: Sequence[Cell], skipped: int) -> None:
-        """See the base class."""
-        self.finished = skipped
-        if skipped:
-            say(f"{skipped} cells finished before; --rerun runs them again")
-        self.progress.update(self.task, total=sum(c.steps for c in cells))
-
-    def started(self, cell: Cell) -> None:
-        """See the base class."""
-        self.running[cell.title] = 0
-        self._show()
-
-    def stepped(self, cell: Cell, steps: int) -> None:
-        """See the base class."""
-        self.running[cell.title] = steps
-        self._show()
-
-    def ended(self, cell: Cell, row: dict[str, object]) -> None:
-        """See the base class."""
-        self.running.pop(cell.title, None)
-        self.done += cell.steps
-        self.finished += 1
-        seconds = row.get("solve_seconds_mean", "")
-        time = f"{float(str(seconds)):.4f} s a solve" if seconds != "" else "no solve"
-        reason = f": {row['reason']}" if row["reason"] else ""
-        say(f"{cell.title}: {time}, {row['outcome']}{reason}")
-        self._show()
-
-    def waiting(self, what: str) -> None:
-        """See the base class."""
-        say(f"waiting for {what}")
-
-    def _show(self) -> None:
-        completed = self.done + sum(self.running.values())
-        what = " | ".join(self.running) or "the referee"
-        self.progress.update(self.task, completed=completed, description=plain(what))
-
-    def kept(self, planned: int) -> str:
-        """What an interrupted run leaves."""
-        if not self.finished:
-            return "; no cell had finished"
-        finished = f"{self.finished} of {planned}"
-        return f"; every finished cell is kept ({finished}), run the same again to go on"
-
-
-def _print_summary(summary: Summary, planned: int, results: Path) -> None:
-    if not summary.cells:
-        say(f"nothing to run: all {planned} cells have finished; results in {results}")
-        return
-    say(
-        f"{summary.cells} cells in {summary.wall:.1f} s: solvers and physics {summary.play:.1f} s, "
-        f"processes' start {summary.start:.1f} s, suite overhead {100 * summary.overhead:.1f}% "
-        f"of the wall time; the referee worked {summary.judging:.1f} s while processes started"
-    )
-    say(f"results in {results}")
 
 
 def _terminate(*_: object) -> None:
