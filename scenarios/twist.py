@@ -9,7 +9,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
-from strainbench.problem.problem import longest_edges
+from strainbench.problem.problem import Problem, longest_edges
 from strainbench.scenario.scenario import FEWEST_STEPS, Scenario, SheetScenario, StepReport
 
 SIDE = 0.5  # [m]
@@ -72,9 +72,9 @@ class Twist(SheetScenario):
         first = self.first_step
         return max(FEWEST_STEPS, int(first) + 1) if np.isfinite(first) else FEWEST_STEPS
 
-    def has_begun(self, candidate: FloatArray) -> bool:
+    def has_begun(self, frame: Problem) -> bool:
         """See the base class."""
-        return self.problem().with_target(candidate).infeasible_pins() is not None
+        return frame.infeasible_pins() is not None
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class; the axis is x."""

@@ -138,10 +138,10 @@ def _missed(scene: Scenario, folder: Path, count: int, steps: int) -> list[str]:
     if not count:
         return []
     problem, words = scene.problem(), []
-    candidates = [target for target, _ in read_frames(folder, count)]
-    if not any(np.any(problem.violations(target)) for target in candidates):
+    frames = [problem.with_target(target) for target, _ in read_frames(folder, count)]
+    if not any(np.any(frame.violations(frame.target)) for frame in frames):
         words.append("no candidate was beyond the limits: nothing had to be projected")
-    if not any(scene.has_begun(target) for target in candidates):
+    if not any(scene.has_begun(frame) for frame in frames):
         first = scene.first_step
         later = f"; it begins at about step {first:g}" if steps < first < np.inf else ""
         words.append(f"{scene.about} never happened in these {steps} steps{later}")

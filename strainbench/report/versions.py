@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 
 from strainbench.bench.cell import content_of
@@ -33,17 +34,20 @@ def shown_runs(folder: Path) -> list[Row]:
     RecordsError
         If the records are damaged.
     """
-    machines = read_machines(folder)
+    machines, now = read_machines(folder), cache(content_of)  # once for all rows that ask alike
+    changes = {name: _changed_packages(facts) for name, facts in machines.items()}
     kept: dict[tuple[str, ...], Row] = {}
     for row in latest_runs(folder).values():
-        row = row | {"older": _older_source(row)}
+        row = row | {"older": _older_source(row, now)}
         before = kept.get(_subject(row))
         if before is None or before["older"] or not row["older"]:
             kept[_subject(row)] = row
     for row in kept.values():
-        facts = machines.get(row["machine"], {})
-        row["older"] = row["older"] or _older_suite(row, facts)
-        row["threads"] = row["threads"] or str(facts.get("threads_per_solver", 1))
+        name = row["machine"]
+        older = UNKNOWN if row["suite"] != suite_digest() else changes.get(name, "")
+        row["older"] = row["older"] or older
+        threads = machines.get(name, {}).get("threads_per_solver", 1)
+        row["threads"] = row["threads"] or str(threads)
     rows = list(kept.values())
     for name in ("solver", "scenario"):
         _tell_apart(rows, name)
@@ -62,31 +66,35 @@ def _outside(source: str) -> str:
     return source if os.path.isabs(source) else ""
 
 
-def _older_source(row: Row) -> str:
-    """How the sources differ from those that a row was measured with."""
+def _older_source(row: Row, now: Callable[[str, tuple[str, ...]], str]) -> str:
+    """How the sources differ from those that a row was measured with.
+
+    Parameters
+    ----------
+    now : the digest of a source and of the files that words name, as they are
+    """
     if not row["content"]:
         return UNKNOWN
-    for name, content in zip(PLUGINS, row["content"].split(), strict=True):
+    for name, content in zip(PLUGINS, row["content"].split(" "), strict=True):
         source = row[f"{name}_source"]
+        if not source:  # of a solver that is unavailable
+            continue
         if not (ROOT / source).exists():
             return f"with {source}, which is gone"
         settings = json.loads(row[f"{name}_parameters"] or "{}").values()
-        if content_of(source, settings) != content:
+        if now(source, tuple(v for v in settings if isinstance(v, str))) != content:
             return f"with {source} before its latest edit"
     return ""
 
 
-def _older_suite(row: Row, facts: Mapping[str, object]) -> str:
-    """How the suite and the packages differ from those installed."""
-    if row["suite"] != suite_digest():
-        return UNKNOWN
+def _changed_packages(facts: Mapping[str, object]) -> str:
+    """How a machine's packages differ from those installed."""
     packages = facts.get("packages")
-    if isinstance(packages, Mapping):
-        now = installed(packages)
-        changed = [f"{n} {packages[n]} (now {now[n]})" for n in packages if packages[n] != now[n]]
-        if changed:
-            return "with " + ", ".join(changed)
-    return ""
+    if not isinstance(packages, Mapping):
+        return ""
+    now = installed(packages)
+    changed = [f"{n} {packages[n]} (now {now[n]})" for n in packages if packages[n] != now[n]]
+    return "with " + ", ".join(changed) if changed else ""
 
 
 def _tell_apart(rows: Sequence[Row], name: str) -> None:

@@ -132,8 +132,8 @@ class Scenario(ABC):
         """Time steps of a run that is not told how many: enough for what the scene is about."""
         return FEWEST_STEPS
 
-    def has_begun(self, candidate: FloatArray) -> bool:  # noqa: ARG002
-        """Whether what the scene is about happens where `candidate` (n, 3) is to be projected."""
+    def has_begun(self, frame: Problem) -> bool:  # noqa: ARG002
+        """Whether what the scene is about happens in this projection."""
         return True
 
     @property
@@ -253,10 +253,10 @@ class ClothScenario(SheetScenario):
         """See the base class."""
         return max(FEWEST_STEPS, ceil(self.lasts / self.step))
 
-    def has_begun(self, candidate: FloatArray) -> bool:
+    def has_begun(self, frame: Problem) -> bool:
         """See the base class: whether a vertex is in an obstacle's margin, if there are any."""
         contact = self.contact()
-        return contact is None or contact.touches(candidate)
+        return contact is None or contact.touches(frame.target)
 
     def material(self) -> Material:
         """The constants of Tang et al. 2022, section 5; without the energies not needed."""

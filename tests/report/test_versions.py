@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 
 import pytest
 
@@ -10,7 +11,7 @@ from strainbench.bench.judge import identity
 from strainbench.bench.machine import PACKAGES, describe_machine, installed
 from strainbench.bench.plan import plan
 from strainbench.bench.records import RUN_COLUMNS, RUNS, append_rows, remember_machine
-from strainbench.report import load_runs
+from strainbench.report import load_runs, versions
 from strainbench.report.table import older
 from strainbench.report.versions import UNKNOWN, shown_runs
 
@@ -115,3 +116,19 @@ def test_other_settings_are_other_rows(tmp_path, mine):
     parameters = json.dumps({"sweeps": 4})
     measure(tmp_path, mine, seconds=2, cell="b", solver_parameters=parameters)
     assert [seconds for _, seconds, _ in shown(tmp_path)] == ["1", "2"]
+
+
+def test_a_solver_that_is_unavailable_has_no_source_to_be_older(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "clarabel", None)
+    monkeypatch.delitem(sys.modules, "solvers.clarabel", raising=False)
+    measure(tmp_path, "clarabel", seconds="", outcome="no answer", reason="unavailable: needs it")
+    assert shown(tmp_path) == [("clarabel", "", "")]
+
+
+def test_what_is_installed_is_looked_up_once_for_rows_that_ask_alike(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(versions, "content_of", lambda *words: asked.append(words) or "other")
+    for k in range(5):
+        measure(tmp_path, "none", seconds=k, cell=str(k), tolerance=10.0**-k)
+    shown_runs(tmp_path)
+    assert len(asked) == len(set(asked)) == 1

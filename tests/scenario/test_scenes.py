@@ -293,18 +293,18 @@ def plan_all(scene):
 
 def test_contact_has_begun_in_the_margin_and_not_above():
     scene = SphereDrop(resolution=4)
-    x = scene.sheet()[2]
-    assert not scene.has_begun(x)
-    assert scene.has_begun(x - [0.0, 0.011, 0.0])
-    assert Flag(resolution=4).has_begun(Flag(resolution=4).sheet()[2])
+    frame = scene.problem()
+    assert not scene.has_begun(frame)
+    assert scene.has_begun(frame.with_target(frame.target - [0.0, 0.011, 0.0]))
+    assert Flag(resolution=4).has_begun(Flag(resolution=4).problem())
 
 
 def test_a_twist_has_begun_where_no_positions_meet_the_limits():
     scene = Twist(resolution=4)
     first = int(scene.first_step)
     degrees = scene.turn_rate * scene.step
-    turns = [turned(scene, np.deg2rad(degrees * k)).target for k in (first - 1, first)]
-    assert [scene.has_begun(x) for x in turns] == [False, True]
+    turns = [turned(scene, np.deg2rad(degrees * k)) for k in (first - 1, first)]
+    assert [scene.has_begun(frame) for frame in turns] == [False, True]
 
 
 def test_a_row_says_what_never_happened(tmp_path):
