@@ -12,7 +12,7 @@ import numpy as np
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
 from strainbench.problem.limits import StretchLimits
-from strainbench.scenario.scenario import ClothScenario
+from strainbench.scenario.cloth import ClothScenario
 
 SIDE = 0.5  # [m]
 

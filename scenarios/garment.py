@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.meshcheck import (
     level_openings,
     odd_edges,
@@ -19,7 +20,6 @@ from strainbench.scenario.meshcheck import (
     unsewn,
 )
 from strainbench.scenario.meshfile import MeshFile, flattened, read_mesh
-from strainbench.scenario.scenario import ClothScenario
 
 DATA = Path(__file__).parent / "data"
 WAIST, HEM, SLANT = 0.10, 0.25, 0.40

@@ -9,7 +9,7 @@ import numpy as np
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.energies.contact import Contact, Floor, Sphere
 from strainbench.problem.grid import square_grid
-from strainbench.scenario.scenario import ClothScenario
+from strainbench.scenario.cloth import ClothScenario
 
 SIDE = 0.5  # [m]
 RADIUS = 0.1  # [m]

@@ -9,7 +9,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
-from strainbench.problem.problem import Problem, longest_edges
+from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import FEWEST_STEPS, Scenario, SheetScenario, StepReport
 
 SIDE = 0.5  # [m]
@@ -93,7 +93,7 @@ class Twist(SheetScenario):
     @property
     def infeasible_angle(self) -> float:
         """The angle [rad] from which on no positions meet the limits; infinite if there is none."""
-        edges, lengths = longest_edges(self.problem())
+        edges, lengths = self.problem().longest_edges()
         rest = self.sheet()[0]
         outer = np.all(rest[edges][..., 1] == 0, axis=1)
         stretch = float(np.sum(lengths[outer])) / SIDE

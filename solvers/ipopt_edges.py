@@ -6,7 +6,7 @@ not stretch. Only that set is theirs; their solver, a relaxed active-set iterati
     minimise s/2 ||x - target||_M^2  such that  l L_ij <= |x_i - x_j| <= b_ij  for every edge,
 
 with rest lengths L_ij, and b_ij the largest length that the problem's limits leave the edge
-(`strainbench.problem.problem.longest_edges`): b L_ij where the edge lies along a direction of
+(`strainbench.problem.reach.longest_edges`): b L_ij where the edge lies along a direction of
 bound b.
 
 It is another feasible set. Every point within the limits is in it, but three lengths say nothing
@@ -24,7 +24,6 @@ import numpy as np
 
 from solvers.ipopt import Ipopt, Rows, Structure
 from strainbench import Clock, Problem, Solution, StretchLimits
-from strainbench.problem.problem import longest_edges
 from strainbench.solver.memory import Memory
 
 
@@ -62,9 +61,9 @@ class IpoptEdges(Ipopt):
 
     def rows(self, problem: Problem) -> Rows:
         """The lengths of the edges over their rest lengths."""
-        edges, longest = longest_edges(problem)
+        edges, longest = problem.longest_edges()
         unstretched = StretchLimits.exact(1.0, dim=problem.rest.shape[-1])
-        rest = longest_edges(replace(problem, limits=unstretched))[1] if len(edges) else longest
+        rest = replace(problem, limits=unstretched).longest_edges()[1] if len(edges) else longest
         ends = np.array([1.0, -1.0]) / rest[:, None]
         return Rows(edges, ends, np.full(len(edges), self.lower), longest / rest)
 

@@ -8,7 +8,8 @@ from strainbench.problem.grid import square_grid
 from strainbench.problem.limits import StretchLimits
 from strainbench.problem.problem import Problem
 from strainbench.referee.certificate import Certificate, certify
-from strainbench.scenario.scenario import ClothScenario, Scenario, SheetScenario, StepReport
+from strainbench.scenario.cloth import ClothScenario
+from strainbench.scenario.scenario import Scenario, SheetScenario, StepReport
 from strainbench.solver.memory import Memory
 from strainbench.solver.solve import solve
 from strainbench.solver.solver import Clock, Solution, Solver

@@ -12,7 +12,8 @@ from rich.text import Text
 ANSI = re.compile(r"\x1b(?:\][^\x07\x1b]*(?:\x07|\x1b\\)|\[[0-?]*[ -/]*[@-~]|[@-Z\\-_])")
 UNSEEN = re.compile(r"[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 """Controls, those of the direction of writing, line separators, halves of surrogate pairs."""
-FORMULA = ("=", "+", "-", "@")
+FORMULA = re.compile(r"'*[=+\-@\t\r\uff1d\uff0b\uff0d\uff20]")
+"""What a spreadsheet takes for one, the quote that keeps it from that included."""
 MARKDOWN = (
     (re.compile(r"([\\`*|~])"), r"\\\1"),
     (re.compile(r"&"), "&amp;"),
@@ -94,8 +95,17 @@ def cell(value: object) -> object:
     if not isinstance(value, str):
         return value
     words = plain(value)
-    formula = len(words) > 1 and words.startswith(FORMULA) and not _is_number(words)
-    return f"'{words}" if formula else words
+    return words if len(words) < 2 or _is_number(words) else quoted(words)
+
+
+def quoted(text: str) -> str:
+    """Text that no spreadsheet takes for a formula: an apostrophe stands before one."""
+    return f"'{text}" if FORMULA.match(text) else text
+
+
+def unquoted(text: str) -> str:
+    """What `quoted` was given."""
+    return text[1:] if text.startswith("'") and FORMULA.match(text) else text
 
 
 def _is_number(text: str) -> bool:

@@ -20,8 +20,9 @@ from rich.console import Console
 from rich.table import Table
 
 from strainbench import escape
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.plan import plan
-from strainbench.bench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows
+from strainbench.bench.records import RUNS, STEPS, append_rows
 from strainbench.studies.duel.measure import Entry
 from strainbench.studies.duel.report import Outcome
 from strainbench.studies.ledger import Row

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from strainbench.bench.plan import parse_value, plan
+from strainbench.bench.plan import plan
+from strainbench.bench.settings import parse_value
 from strainbench.cli.listing import described, found, tables
 from strainbench.scenario.registry import list_scenarios
 from strainbench.solver.registry import list_solvers

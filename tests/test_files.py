@@ -12,11 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.plan import plan
 from strainbench.bench.records import (
-    RUN_COLUMNS,
     RUNS,
-    STEP_COLUMNS,
     STEPS,
     DiskError,
     RecordsError,

@@ -24,12 +24,11 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from strainbench.bench.cell import Cell
+from strainbench.bench.columns import STEP_COLUMNS
 from strainbench.bench.ending import Ending
 from strainbench.bench.judge import identity
-from strainbench.bench.play import in_words
 from strainbench.bench.process import OUTPUT
 from strainbench.bench.records import (
-    STEP_COLUMNS,
     STEPS,
     latest_runs,
     read_machines,
@@ -39,6 +38,7 @@ from strainbench.bench.records import (
 )
 from strainbench.bench.runner import Observer, Runner, Settings
 from strainbench.files import locked
+from strainbench.plugins import told
 
 Results = tuple[list[dict[str, str]], list[dict[str, str]], dict[str, dict[str, object]]]
 """Rows of runs.csv, rows of steps.csv, machines."""
@@ -78,7 +78,7 @@ def run_on_cluster(
         for future in _as_completed(futures, client, address, observer):
             cell = futures[future]
             if failure := future.exception():
-                reason = f"{Ending.LOST}: {in_words(failure)}"
+                reason = f"{Ending.LOST}: {told(failure)}"
                 row = {"steps_done": 0, "outcome": "no answer", "reason": reason}
                 home.write(cell, identity(cell) | row, [])
             else:

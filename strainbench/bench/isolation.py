@@ -13,7 +13,8 @@ import psutil
 
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
-from strainbench.bench.play import EVENTS, GO, Task, play, read_journal
+from strainbench.bench.journal import EVENTS, GO, read_journal
+from strainbench.bench.play import Task, play
 from strainbench.bench.process import Child, Family
 
 START_LIMIT = 180.0  # [s] to import the suite and plug-ins and to build the problem, cold disks

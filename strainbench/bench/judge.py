@@ -17,8 +17,9 @@ import numpy as np
 
 from strainbench.bench.cell import Cell, PluginRef
 from strainbench.bench.ending import Ending
-from strainbench.bench.play import in_words, read_events, read_frames, read_journal
+from strainbench.bench.journal import read_events, read_frames, read_journal
 from strainbench.bench.records import SCHEMA
+from strainbench.plugins import told
 from strainbench.referee.certificate import OUTCOMES, Certificate, certify
 from strainbench.referee.reference import Kept, ReferenceSolver
 from strainbench.scenario.scenario import Scenario, StepReport
@@ -55,7 +56,7 @@ def serve() -> None:
             verdict: object = judge(cell, folder, ending, kept)
         except BaseException as error:  # of a scene's code, sys.exit among them, or our own
             traceback.print_exc()
-            verdict = in_words(error)
+            verdict = told(error)
         os.chdir(home)  # wherever a scene has gone
         part = folder / "verdict.part"
         part.write_text(json.dumps(verdict, default=_plain), encoding="utf-8")

@@ -7,8 +7,6 @@ before stays.
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 import time
 import traceback
@@ -26,135 +24,17 @@ from threadpoolctl import threadpool_info
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
+from strainbench.bench.journal import GO, Journal, read_events, read_targets
+from strainbench.plugins import told
 from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import StepReport
 from strainbench.solver.solver import Solution, Solver, run_solver, warm_up
 
-EVENTS, FRAMES, TARGETS, GO = "events.jsonl", "frames.bin", "targets.bin", "go"
-NUMBER = (int, float)
-FACTS: dict[str, dict[str, type | tuple[type, ...]]] = {
-    "loaded": {
-        "variables": int,
-        "constraints": int,
-        "nonzeros": int,
-        "needs": str,
-        "blas_threads": int,
-    },
-    "warming": {},
-    "compiling": {},
-    "compiled": {},
-    "ready": {},
-    "started": {},
-    "setup": {"seconds": NUMBER},
-    "projection": {
-        "step": int,
-        "begin": NUMBER,
-        "end": NUMBER,
-        "seconds": NUMBER,
-        "iterations": int,
-        "status": str,
-        "details": dict,
-    },
-    "step": {"step": int, **{f.name: NUMBER for f in fields(StepReport)}},
-    "iterate": {"tolerance": NUMBER, "seconds": NUMBER, "iterations": int, "status": str},
-    "answer": {"tolerance": NUMBER, "seconds": NUMBER, "iterations": int, "status": str},
-    "failed": {"reason": str},
-    "ended": {"peak_memory_mb": NUMBER},
-}
-"""The events, and what must be said with each."""
 LONGEST_STATUS = 1000  # characters
-now = time.monotonic  # one clock for all processes of a machine, as far as it has one
 
 
 class Stop(Exception):  # noqa: N818
     """Ends a cell early, with the reason."""
-
-
-class Journal:
-    """The two files of a running cell."""
-
-    def __init__(self, folder: Path, clock: Callable[[], float] = now) -> None:
-        self._events = (folder / EVENTS).open("a", encoding="utf-8")
-        self._frames = (folder / FRAMES).open("ab")
-        self.clock = clock
-
-    def write(self, event: str, **facts: object) -> None:
-        """Append one event."""
-        self._events.write(json.dumps({"event": event, "at": self.clock(), **facts}) + "\n")
-        self._events.flush()
-
-    def frame(self, target: FloatArray, positions: FloatArray) -> None:
-        """Append a candidate and its answer."""
-        np.save(self._frames, target)
-        np.save(self._frames, np.asarray(positions, dtype=np.float64))
-        self._frames.flush()
-
-
-def read_journal(folder: Path) -> tuple[list[dict[str, Any]], str]:
-    """The events so far, and where the journal is damaged, or ""; nothing is read beyond that.
-
-    A line torn by a killed process is left out.
-    """
-    path = folder / EVENTS
-    if not path.exists():
-        return [], ""
-    events: list[dict[str, Any]] = []
-    lines = path.read_text(encoding="utf-8", errors="replace").split("\n")[:-1]
-    for number, line in enumerate(lines, start=1):
-        try:
-            event = json.loads(line)
-            sound = _is_sound(event)
-        except (ValueError, RecursionError):
-            sound = False
-        if not sound:
-            return events, f"{Ending.DAMAGED} at line {number}"
-        events.append(event)
-    return events, ""
-
-
-def _is_sound(event: Any) -> bool:
-    """Whether it is an event with its facts."""
-    if not isinstance(event, dict) or not isinstance(event.get("at"), NUMBER):
-        return False
-    expected = FACTS.get(str(event.get("event")))
-    if expected is None or not math.isfinite(event["at"]):
-        return False
-    details = event.get("details", {})
-    return all(isinstance(event.get(k), kind) for k, kind in expected.items()) and (
-        isinstance(details, dict) and all(isinstance(v, NUMBER) for v in details.values())
-    )
-
-
-def read_events(folder: Path) -> list[dict[str, Any]]:
-    """The events so far, those before any damage."""
-    return read_journal(folder)[0]
-
-
-def read_frames(folder: Path, count: int) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """The first `count` pairs of candidate and answer."""
-    if not count:
-        return
-    with (folder / FRAMES).open("rb") as file:
-        for _ in range(count):
-            yield np.load(file), np.load(file)
-
-
-def keep_targets(recording: Path) -> None:
-    """Leave the candidates alone in a recording: answers are nothing to feed a solver with."""
-    if not (recording / FRAMES).exists():
-        return
-    count = sum(e["event"] == "projection" for e in read_events(recording))
-    with (recording / TARGETS).open("wb") as file:
-        for target, _ in read_frames(recording, count):
-            np.save(file, target)
-    (recording / FRAMES).unlink()
-
-
-def read_targets(recording: Path, count: int) -> Iterator[FloatArray]:
-    """The first `count` candidates of a recording."""
-    with (recording / TARGETS).open("rb") as file:
-        for _ in range(count):
-            yield np.load(file)
 
 
 Task = Callable[[Cell, Path, Path | None], None]
@@ -174,19 +54,10 @@ def with_journal(folder: Path, work: Callable[[Journal], None]) -> None:
     except Stop as stop:
         journal.write("failed", reason=str(stop))
     except BaseException as error:  # a solver's own error, sys.exit among them, becomes a row
-        journal.write("failed", reason=in_words(error))
+        journal.write("failed", reason=told(error))
         with suppress(Exception):  # a solver may have closed what prints
             traceback.print_exc()
     journal.write("ended", peak_memory_mb=_peak_memory_mb())
-
-
-def in_words(error: BaseException) -> str:
-    """Its type and what it says, if it can say it."""
-    try:
-        text = str(error)
-    except Exception:
-        text = ""
-    return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) -> None:
@@ -250,7 +121,7 @@ def _short(value: object) -> str:
     try:
         return repr(value)[:80]
     except Exception as error:  # a plug-in's own type
-        return f"a {type(value).__name__} ({in_words(error)[:80]})"
+        return f"a {type(value).__name__} ({told(error)[:80]})"
 
 
 def start_warming(journal: Journal) -> None:
@@ -356,7 +227,7 @@ def what_it_says(solution: Solution) -> dict[str, Any]:
     try:
         status = str(solution.status)[:LONGEST_STATUS]
     except Exception as error:  # of a solver's own type
-        raise Stop(f"a status that cannot be written ({in_words(error)})") from None
+        raise Stop(f"a status that cannot be written ({told(error)})") from None
     return {
         "iterations": int(iterations),
         "status": status,

@@ -17,6 +17,16 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+from strainbench.bench.columns import (
+    COUNTS,
+    FACTS,
+    PROSE,
+    RUN_COLUMNS,
+    SETTINGS,
+    STEP_COLUMNS,
+    WORDS,
+)
+from strainbench.escape import quoted, unquoted
 from strainbench.files import DiskError as DiskError
 from strainbench.files import RecordsError as RecordsError
 from strainbench.files import (
@@ -33,138 +43,13 @@ SCHEMA = 2
 LONGEST_TEXT = 10_000  # characters of what is said in words
 RUNS, STEPS, MACHINES, PENDING = "runs.csv", "steps.csv", "machines.json", ".pending"
 
-RUN_COLUMNS = (
-    "schema",
-    "cell",
-    "finished_at",
-    "scenario",
-    "resolution",
-    "limit",
-    "directions",
-    "integrator",
-    "solver",
-    "tolerance",
-    "mode",
-    "steps_asked",
-    "steps_done",
-    "outcome",
-    "reason",
-    "solve_seconds_mean",
-    "solve_seconds_median",
-    "setup_seconds",
-    "ie_seconds_mean",
-    "iterations_mean",
-    "details_mean",
-    "max_violation",
-    "max_principal_stretch",
-    "relative_gap_max",
-    "distance_max",
-    "distance_bound_max",
-    "reference_error_max",
-    "projections",
-    "projections_violated",
-    "projections_optimal",
-    "newton_failures",
-    "variables",
-    "constraints",
-    "nonzeros",
-    "needs",
-    "active_constraints_max",
-    "peak_memory_mb",
-    "blas_threads",
-    "time_limit",
-    "violation_threshold",
-    "gap_threshold",
-    "start_seconds",
-    "play_seconds",
-    "judge_seconds",
-    "scenario_parameters",
-    "solver_parameters",
-    "machine",
-    "threads",
-    "solver_source",
-    "scenario_source",
-    "content",
-    "suite",
-)
-STEP_COLUMNS = (
-    "cell",
-    "step",
-    "projection",
-    "outcome",
-    "status",
-    "seconds",
-    "iterations",
-    "max_violation",
-    "max_principal_stretch",
-    "objective",
-    "lower_bound",
-    "relative_gap",
-    "distance",
-    "distance_bound",
-    "reference_error",
-    "active_constraints",
-    "details",
-    "time",
-    "ie_seconds",
-    "newton_iterations",
-    "newton_converged",
-    "assembly_seconds",
-    "factorisation_seconds",
-    "line_search_seconds",
-    "kinetic_energy",
-    "gravity_energy",
-    "membrane_energy",
-    "bending_energy",
-    "momentum_x",
-    "momentum_y",
-    "momentum_z",
-    "pin_work",
-    "contact_energy",
-    "penetration",
-    "equilibrium_residual",
-    "equilibrium_distance",
-)
-
-WORDS = {
-    *("cell", "finished_at", "scenario", "integrator", "solver", "mode", "outcome", "reason"),
-    "directions",  # a number, or exact
-    *("details_mean", "needs", "scenario_parameters", "solver_parameters", "machine"),
-    *("status", "details", "newton_converged"),
-    *("problem", "sampled_by", "ending"),
-    *("solver_source", "scenario_source", "content", "suite"),
-}
-"""Columns of runs.csv, steps.csv and convergence.csv that are not numbers."""
-COUNTS = {
-    *("step", "projection", "steps_asked", "steps_done"),
-    *("projections", "projections_violated", "projections_optimal", "newton_failures"),
-    *("variables", "constraints", "threads"),
-}
-"""Numbers that the suite itself counts."""
-SETTINGS = {"scenario_parameters", "solver_parameters", "details_mean", "details"}
-"""Words that are JSON."""
-PROSE = {"reason", "status", "ending"}
-"""Words that are brought onto one line, of sane length."""
-FACTS = ("memory_gb", "system", "python", "threads_per_solver")
-"""What is known of every machine."""
 FIRST = 4  # columns that every header has had
-FORMULA = re.compile(r"'*[=+\-@\t\r\uff1d\uff0b\uff0d\uff20]")
 NO_HEADER = f"it is no header of schema 1 to {SCHEMA}"
 REPAIR = "nothing was changed; mend or move the file, or give another --results"
 
 Row = dict[str, str]
 log = logging.getLogger(__name__)
 csv.field_size_limit(2**31 - 1)  # whatever a plug-in had to say
-
-
-def plain_cell(value: object) -> object:
-    """Text that no spreadsheet takes for a formula; anything else as it is."""
-    return f"'{value}" if isinstance(value, str) and FORMULA.match(value) else value
-
-
-def _original(text: str) -> str:
-    """What `plain_cell` was given."""
-    return text[1:] if text.startswith("'") and FORMULA.match(text) else text
 
 
 def read_rows(path: Path, columns: Sequence[str]) -> list[Row]:
@@ -199,7 +84,7 @@ def _parsed(path: Path, columns: Sequence[str]) -> tuple[list[Row], bytes]:
         row = dict.fromkeys(columns, "") | dict(zip(header, record, strict=False))
         if fault := fault or _value_fault(row):
             raise RecordsError(f"{path}, record {number}{fault}; {REPAIR}")
-        rows.append({name: _original(v) if name in WORDS else v for name, v in row.items()})
+        rows.append({name: unquoted(v) if name in WORDS else v for name, v in row.items()})
     return rows, rest
 
 
@@ -344,7 +229,7 @@ def _as_csv(columns: Sequence[str], rows: Sequence[Mapping[str, object]], header
         texts = {name: _as_text(name, value) for name, value in row.items()}
         if fault := _value_fault(texts):
             raise RecordsError(f"a row to be written{fault}")
-        writer.writerow({k: plain_cell(v) if k in WORDS else v for k, v in texts.items()})
+        writer.writerow({k: quoted(v) if k in WORDS else v for k, v in texts.items()})
     return buffer.getvalue().encode()
 
 

@@ -23,6 +23,7 @@ from pathlib import Path
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running, crashed
+from strainbench.bench.journal import keep_targets
 from strainbench.bench.judge import (
     CASE,
     JUDGED,
@@ -34,7 +35,6 @@ from strainbench.bench.judge import (
     unjudged,
 )
 from strainbench.bench.machine import describe_machine, fixed_threads
-from strainbench.bench.play import keep_targets
 from strainbench.bench.process import Child, Family, family
 from strainbench.bench.recording import recorder
 from strainbench.bench.records import latest_runs, mend, open_folder, remember_machine, write_cell

@@ -12,7 +12,8 @@ from rich import box
 from rich.table import Table
 
 from strainbench.bench.cell import PluginRef
-from strainbench.bench.plan import from_file, is_file, with_defaults
+from strainbench.bench.plan import from_file, with_defaults
+from strainbench.bench.settings import is_file
 from strainbench.escape import terminal
 from strainbench.fields import hints, spelled, words
 from strainbench.options import shown

@@ -15,7 +15,7 @@ from strainbench.physics.energies.contact import Contact, add_blocks
 from strainbench.physics.energies.membrane import add_membrane_gradient, add_membrane_hessian
 from strainbench.physics.linear import LinearSolver, best_linear_solver, symmetric
 from strainbench.physics.pattern import Pattern
-from strainbench.problem.problem import shape_gradients
+from strainbench.problem.elements import shape_gradients
 
 
 @dataclass(frozen=True)

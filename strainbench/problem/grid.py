@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
-from strainbench.problem.problem import shape_gradients
+from strainbench.problem.elements import shape_gradients
 
 
 def square_grid(resolution: int, side: float, diagonals: str) -> tuple[FloatArray, IntArray]:

@@ -14,58 +14,19 @@ import copy
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 from typing import Literal, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import dijkstra
-from scipy.spatial import ConvexHull, QhullError
 
 from strainbench.arrays import FloatArray, IntArray, frozen_array, index_array, read_only
+from strainbench.problem.elements import rest_corners, shape_gradients
 from strainbench.problem.limits import StretchLimits
+from strainbench.problem.reach import longest_edges
 
 Value = TypeVar("Value")
-
-ROUNDING = 4 * np.finfo(float).eps  # of a unit length
-FLAT = 1e-9  # a hull that is thinner, for its length, tells nothing
-
-
-def rest_corners(rest: FloatArray, elements: IntArray) -> FloatArray:
-    """(e, k, dim) material positions of each element's own corners [m], however `rest` is given."""
-    return rest[elements] if rest.ndim == 2 else rest
-
-
-def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Gradients B of the linear shape functions, and the elements' areas or volumes.
-
-    Returns
-    -------
-    gradients : (e, k, dim)
-        F_e = sum_k x_k B_k [1/m] (Tang et al. 2022, appendix A).
-    measures : (e,)
-        Rest area [m^2] of a triangle, rest volume [m^3] of a tetrahedron.
-
-    Raises
-    ------
-    ValueError
-        Naming the first element without area or volume, to working precision.
-    """
-    corners = rest_corners(rest, elements)
-    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-    dim = rest.shape[-1]
-    determinant = np.linalg.det(edges)
-    size = np.abs(edges).max(axis=(1, 2), initial=0) ** dim
-    flat = np.flatnonzero(np.abs(determinant) <= 1e-14 * size)
-    if len(flat):
-        word = "area" if dim == 2 else "volume"
-        raise ValueError(
-            f"elements[{flat[0]}] (vertices {elements[flat[0]].tolist()}) has no rest {word}"
-        )
-    inverse = np.linalg.inv(edges)
-    gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
-    return read_only(gradients), read_only(np.abs(determinant) / (2 if dim == 2 else 6))
 
 
 def _of_mesh(compute: Callable[[Problem], Value]) -> cached_property[Value]:
@@ -414,71 +375,16 @@ class Problem:
         farthest += self._reach[nearest, self.free]
         return 0.5 * float(np.sum(self.weights[self.free] * farthest**2))
 
+    def longest_edges(self) -> tuple[IntArray, FloatArray]:
+        """(k, 2) edges, and (k,) how long the limits let each become [m]."""
+        return longest_edges(rest_corners(self.rest, self.elements), self.elements, self.limits)
+
     @_of_mesh
     def _reach(self) -> FloatArray:
         """(p, n) an upper bound on the distance of each vertex from each pin [m]."""
         if len(self.pinned) == 0:
             return read_only(np.zeros((0, self.vertices)))
-        edges, lengths = longest_edges(self)
+        edges, lengths = self.longest_edges()
         graph = sp.csr_array((lengths, (edges[:, 0], edges[:, 1])), shape=2 * (self.vertices,))
         reach: FloatArray = dijkstra(graph, directed=False, indices=self.pinned)
         return reach
-
-
-def longest_edges(problem: Problem) -> tuple[IntArray, FloatArray]:
-    """How long the limits let each edge become.
-
-    With e = sum_j c_j d_j over the limited directions, ||F e|| <= sum_j |c_j| b_j; the smallest
-    such bound over all coefficients and adjacent elements is kept. With exact limits,
-    ||F e|| <= ||D^-1 e||.
-
-    Returns
-    -------
-    edges : (k, 2)
-        Vertex pairs whose length the limits bound.
-    lengths : (k,)
-        Upper bound on the deformed length [m].
-    """
-    pairs = list(combinations(range(problem.elements.shape[1]), 2))
-    corners = rest_corners(problem.rest, problem.elements)
-    first, second = np.array(pairs).T
-    vectors = corners[:, second] - corners[:, first]
-    bounds = np.atleast_2d(problem.limits.bounds)
-    if problem.limits.spectral:
-        longest = np.linalg.norm(vectors * bounds[:, None], axis=2)
-    else:
-        longest = np.empty(vectors.shape[:2])
-        kinds, kind = np.unique(bounds, axis=0, return_inverse=True)
-        kind = np.broadcast_to(kind.ravel(), len(vectors))
-        order = np.argsort(kind, kind="stable")
-        starts = np.searchsorted(kind[order], np.arange(1, len(kinds)))
-        for b, same in zip(kinds, np.split(order, starts), strict=True):
-            longest[same] = gauge(problem.limits.directions, b, vectors[same])
-    edges = np.sort(problem.elements[:, pairs].reshape(-1, 2), axis=1)
-    unique, inverse = np.unique(edges, axis=0, return_inverse=True)
-    lengths = np.full(len(unique), np.inf)
-    np.minimum.at(lengths, inverse.ravel(), longest.ravel())
-    limited = np.isfinite(lengths)
-    return unique[limited], lengths[limited]
-
-
-def gauge(directions: FloatArray, bounds: FloatArray, vectors: FloatArray) -> FloatArray:
-    """The least sum_j |c_j| b_j with e = sum_j c_j d_j, of each vector e (..., dim).
-
-    That is the norm whose unit ball is the hull of all +-d_j / b_j: the largest a.e over its
-    facets a.p = 1. Infinite where the directions do not span the space.
-    """
-    unit = bounds.min()
-    points = directions * (unit / bounds)[:, None]
-    try:
-        facets = ConvexHull(np.concatenate([points, -points])).equations
-    except QhullError:  # the hull is flat
-        return np.full(vectors.shape[:-1], np.inf)
-    distance = -facets[:, -1] - ROUNDING  # so that no length comes out too short
-    if distance.min() < FLAT:
-        return np.full(vectors.shape[:-1], np.inf)
-    normals = (facets[:, :-1] / distance[:, None]).T
-    parts = np.array_split(vectors, 1 + vectors.size * len(facets) // 10**7)  # for memory's sake
-    lengths: FloatArray = np.concatenate([(part @ normals).max(axis=-1) for part in parts])
-    lengths *= unit
-    return lengths

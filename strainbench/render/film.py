@@ -13,7 +13,7 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.physics.energies.contact import Obstacle
 from strainbench.problem.problem import Problem
-from strainbench.scenario.scenario import ClothScenario
+from strainbench.scenario.cloth import ClothScenario
 from strainbench.solver.solver import Solver, run_solver
 
 Track = Callable[[Iterable[Any], str, int], Iterable[Any]]

@@ -7,7 +7,8 @@ from pathlib import Path
 import pandas as pd
 
 from strainbench import escape
-from strainbench.bench.records import WORDS, RecordsError, read_machines
+from strainbench.bench.columns import WORDS
+from strainbench.bench.records import RecordsError, read_machines
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_markdown
 from strainbench.report.failures import failures, failures_markdown

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from strainbench.bench.records import STEP_COLUMNS, latest_steps
+from strainbench.bench.columns import STEP_COLUMNS
+from strainbench.bench.records import latest_steps
 
 
 def newest_steps(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:

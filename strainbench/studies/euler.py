@@ -25,8 +25,8 @@ from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
 from strainbench.physics.integrators import Motion, Project, step_and_project
 from strainbench.physics.linear import LinearSolver, available_linear_solvers
+from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.registry import find_scenario
-from strainbench.scenario.scenario import ClothScenario
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solver, run_solver
 

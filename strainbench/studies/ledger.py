@@ -33,7 +33,8 @@ from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise
 from strainbench.physics.statics import potential
 from strainbench.referee.reference import reference_of
 from strainbench.render.film import Track, untracked
-from strainbench.scenario.scenario import ClothScenario, Scenario, SheetScenario
+from strainbench.scenario.cloth import ClothScenario
+from strainbench.scenario.scenario import Scenario, SheetScenario
 from strainbench.solver.solver import Solver, run_solver
 
 PARTS = ("inertia", "gravity", "membrane", "bending", "contact", "wind")

@@ -6,8 +6,9 @@ import pytest
 from distributed import LocalCluster
 
 from strainbench.bench.cluster import run_on_cluster
+from strainbench.bench.columns import STEP_COLUMNS
 from strainbench.bench.plan import plan
-from strainbench.bench.records import STEP_COLUMNS, STEPS, latest_runs, read_machines, read_rows
+from strainbench.bench.records import STEPS, latest_runs, read_machines, read_rows
 from strainbench.bench.runner import Observer, Settings
 
 

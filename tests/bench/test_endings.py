@@ -11,8 +11,9 @@ from collections import Counter
 import numpy as np
 import pytest
 
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.process import family
-from strainbench.bench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, read_rows
+from strainbench.bench.records import RUNS, STEPS, read_rows
 from strainbench.files import HOLDER
 from tests.processes import left_running, mark_what_starts
 

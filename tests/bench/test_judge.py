@@ -7,9 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from strainbench.bench.journal import read_journal
 from strainbench.bench.judge import _cut_off, _in_time, _outcome, judge_limit, unjudged
 from strainbench.bench.plan import plan
-from strainbench.bench.play import read_journal
 from strainbench.referee.certificate import Certificate
 
 

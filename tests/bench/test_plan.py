@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from strainbench.bench.cell import Cell, PluginRef
-from strainbench.bench.plan import never_warm, parse_settings, parse_value, plan, split_values
+from strainbench.bench.plan import never_warm, plan
+from strainbench.bench.settings import parse_settings, parse_value, split_values
 from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.scenario import SceneWarning
 from strainbench.solver.registry import find_solver

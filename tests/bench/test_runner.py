@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from strainbench.bench import isolation, judge
+from strainbench.bench.columns import STEP_COLUMNS
 from strainbench.bench.plan import from_file, plan
-from strainbench.bench.records import STEP_COLUMNS, STEPS, latest_runs, read_rows
+from strainbench.bench.records import STEPS, latest_runs, read_rows
 from strainbench.bench.runner import Observer, Runner, Settings
 from tests.processes import left_running, mark_what_starts
 

@@ -10,7 +10,8 @@ import time
 
 import pytest
 
-from strainbench.bench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows, read_rows
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
+from strainbench.bench.records import RUNS, STEPS, append_rows, read_rows
 from tests.bench.test_records import run_row
 
 RUN = ["run", "swing", "--solver", "none", "--set", "resolution=2", "--steps", "1"]

@@ -10,7 +10,7 @@ import pytest
 
 from scenarios.swing import Swing
 from strainbench.physics.integrators import INTEGRATORS, Motion
-from strainbench.scenario.scenario import ClothScenario
+from strainbench.scenario.cloth import ClothScenario
 
 OMEGA = 3.0  # [1/s] of a spring to the origin, W = 1/2 m OMEGA^2 x^2, with gravity
 

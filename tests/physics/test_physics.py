@@ -18,8 +18,8 @@ from strainbench.physics.energies.membrane import (
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
 from strainbench.physics.linear import NotPositiveDefiniteError, SuperLU, symmetric
 from strainbench.physics.pattern import Pattern
+from strainbench.problem.elements import shape_gradients
 from strainbench.problem.grid import square_grid
-from strainbench.problem.problem import shape_gradients
 from tests.problems import central_difference, random_mesh, rotation
 
 LAM, MU = Material().lame

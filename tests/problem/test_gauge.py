@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from strainbench import Problem, StretchLimits
-from strainbench.problem.problem import gauge, longest_edges
+from strainbench.problem.reach import gauge
 from tests.problems import random_problem
 
 SHARED = ("G", "edge_length", "free", "held", "bounds", "weights", "row_coefficients", "_reach")
@@ -49,7 +49,7 @@ def test_a_measured_curve_bounds_edges_as_each_of_its_elements_does():
     target = np.column_stack([rest, np.zeros(4)])
     angles = np.pi * np.arange(180) / 180
     limits = StretchLimits.sampled(angles, np.repeat([[1.2], [1.1]], 180, axis=1))
-    edges, lengths = longest_edges(Problem(rest, [[0, 1, 2], [0, 2, 3]], target, limits))
+    edges, lengths = Problem(rest, [[0, 1, 2], [0, 2, 3]], target, limits).longest_edges()
     longest = {tuple(edge): length for edge, length in zip(edges.tolist(), lengths, strict=True)}
     expected = {(0, 1): 1.2, (1, 2): 1.2, (2, 3): 1.1, (0, 3): 1.1, (0, 2): 1.1 * np.sqrt(2)}
     assert longest == pytest.approx(expected, rel=1e-12)

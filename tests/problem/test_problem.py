@@ -7,7 +7,6 @@ import pytest
 
 from strainbench import Problem, StretchLimits, solve
 from strainbench.problem.grid import square_grid
-from strainbench.problem.problem import longest_edges
 from tests.problems import (
     central_difference,
     moved,
@@ -472,7 +471,7 @@ def test_pins_at_feasible_positions_are_never_called_infeasible(seed):
 def test_edges_of_feasible_positions_are_within_their_longest(seed):
     problem = random_problem(np.random.default_rng(seed), directions=3 + seed % 4)
     x = solve(problem.tightened(1e-6), "clarabel").positions
-    edges, longest = longest_edges(problem)
+    edges, longest = problem.longest_edges()
     length = np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1)
     assert np.all(length <= longest * (1 + 1e-12))
     assert np.max(length / longest) > 0.9, "the check is idle: nothing is near its bound"
@@ -503,7 +502,7 @@ def test_rest_by_corner_is_the_same_problem(seed):
     np.testing.assert_array_equal(problem.G.toarray(), shared.G.toarray())
     np.testing.assert_array_equal(problem.measures, shared.measures)
     assert problem.edge_length == shared.edge_length
-    for ours, theirs in zip(longest_edges(problem), longest_edges(shared), strict=True):
+    for ours, theirs in zip(problem.longest_edges(), shared.longest_edges(), strict=True):
         np.testing.assert_array_equal(ours, theirs)
 
 

@@ -7,7 +7,8 @@ import io
 
 import pytest
 
-from strainbench.bench.records import RUN_COLUMNS, RUNS, RecordsError, append_rows
+from strainbench.bench.columns import RUN_COLUMNS
+from strainbench.bench.records import RUNS, RecordsError, append_rows
 from strainbench.report.compare import CSV_HEADER, compare, write_comparison
 from tests.cli.test_cli import strainbench
 from tests.report.test_report import row

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from strainbench import certify, solve
-from strainbench.bench.records import RUN_COLUMNS, RUNS, STEP_COLUMNS, STEPS, append_rows
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
+from strainbench.bench.records import RUNS, STEPS, append_rows
 from strainbench.problem.grid import lumped_areas
 from strainbench.report import load_runs, write_report
 from strainbench.report.failures import failures

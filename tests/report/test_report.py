@@ -10,15 +10,8 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from strainbench.bench.records import (
-    MACHINES,
-    RUN_COLUMNS,
-    RUNS,
-    STEP_COLUMNS,
-    STEPS,
-    RecordsError,
-    append_rows,
-)
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
+from strainbench.bench.records import MACHINES, RUNS, STEPS, RecordsError, append_rows
 from strainbench.report import load_runs, write_report
 from strainbench.report.chart import COLOURS, MARKERS, styles
 from strainbench.report.energy import energies

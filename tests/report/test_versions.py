@@ -7,10 +7,11 @@ import sys
 
 import pytest
 
+from strainbench.bench.columns import RUN_COLUMNS
 from strainbench.bench.judge import identity
 from strainbench.bench.machine import PACKAGES, describe_machine, installed
 from strainbench.bench.plan import plan
-from strainbench.bench.records import RUN_COLUMNS, RUNS, append_rows, remember_machine
+from strainbench.bench.records import RUNS, append_rows, remember_machine
 from strainbench.report import load_runs, versions
 from strainbench.report.table import older
 from strainbench.report.versions import UNKNOWN, shown_runs

@@ -15,12 +15,13 @@ from scenarios.sphere_drop import SphereDrop
 from scenarios.stretch_square import StretchSquare
 from scenarios.twist import Twist
 from strainbench import certify, solve
+from strainbench.bench.journal import FRAMES
 from strainbench.bench.judge import _missed
 from strainbench.bench.plan import plan
-from strainbench.bench.play import FRAMES
 from strainbench.referee.reference import reference_of
+from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.registry import find_scenario, list_scenarios
-from strainbench.scenario.scenario import ClothScenario, SheetScenario
+from strainbench.scenario.scenario import SheetScenario
 
 NAMES = [e.name for e in list_scenarios()]
 

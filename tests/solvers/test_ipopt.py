@@ -11,7 +11,6 @@ from solvers.ipopt import Callbacks, Ipopt
 from solvers.ipopt_edges import IpoptEdges
 from strainbench import Problem, StretchLimits, solve
 from strainbench.problem.grid import square_grid
-from strainbench.problem.problem import longest_edges
 from strainbench.solver.solver import Clock
 from tests.problems import central_difference, random_problem
 
@@ -29,7 +28,7 @@ def dense(structure, values, shape):
 
 
 def edge_lengths(problem, x):
-    edges, longest = longest_edges(problem)
+    edges, longest = problem.longest_edges()
     return np.linalg.norm(x[edges[:, 0]] - x[edges[:, 1]], axis=1), longest
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
 from strainbench.physics.pattern import scatter
-from strainbench.problem.problem import rest_corners
+from strainbench.problem.elements import rest_corners
 
 
 def hinges(rest: FloatArray, elements: IntArray, areas: FloatArray) -> tuple[IntArray, FloatArray]:

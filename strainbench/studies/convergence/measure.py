@@ -18,8 +18,8 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running
+from strainbench.bench.journal import read_events, read_frames
 from strainbench.bench.machine import describe_machine, fixed_threads
-from strainbench.bench.play import read_events, read_frames
 from strainbench.bench.process import family
 from strainbench.bench.records import (
     RecordsError,

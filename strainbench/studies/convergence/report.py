@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from strainbench import escape
+from strainbench.bench.columns import WORDS
 from strainbench.bench.ending import Ending
-from strainbench.bench.records import WORDS, RecordsError, read_machines, read_rows
+from strainbench.bench.records import RecordsError, read_machines, read_rows
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
 from strainbench.report.table import machine_line, power
 from strainbench.studies.convergence.measure import CANDIDATE, COLUMNS, CONVERGENCE

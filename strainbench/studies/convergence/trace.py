@@ -19,14 +19,8 @@ import numpy as np
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
-from strainbench.bench.play import (
-    Journal,
-    Stop,
-    start_warming,
-    wait_for_go,
-    what_it_says,
-    with_journal,
-)
+from strainbench.bench.journal import Journal
+from strainbench.bench.play import Stop, start_warming, wait_for_go, what_it_says, with_journal
 from strainbench.problem.export import load_problem
 from strainbench.problem.problem import Problem
 from strainbench.solver.solver import Solution, run_solver, warm_up

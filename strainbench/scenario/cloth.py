@@ -1,0 +1,183 @@
+"""A sheet of cloth, stepped by one of the paper's schemes (Tang et al. 2022, section 4)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import ceil
+from time import perf_counter
+from typing import ClassVar
+
+import numpy as np
+
+from strainbench.arrays import FloatArray
+from strainbench.physics.cloth import Cloth, Material
+from strainbench.physics.energies.contact import Contact
+from strainbench.physics.implicit_euler import (
+    GRAVITY,
+    NewtonReport,
+    NewtonSettings,
+    minimise_step,
+)
+from strainbench.physics.integrators import INTEGRATORS, Motion
+from strainbench.problem.problem import Problem
+from strainbench.scenario.scenario import FEWEST_STEPS, SheetScenario, StepReport
+
+
+@dataclass(frozen=True)
+class ClothScenario(SheetScenario):
+    """A sheet of cloth, stepped by one of the paper's schemes.
+
+    Gravity, membrane and bending are built where they are in `needs`; without "inertia" each step
+    starts at rest. `begins` is when what the scene is about begins, and `lasts` how long a run
+    shows it, both in seconds of its time.
+
+    Parameters
+    ----------
+    integrator : sap, sar, bap or bar as in the paper, or sar-projected, bar-bdf2 or bar-stable,
+        our variants of them: `strainbench.physics.integrators`.
+    step : time step [s].
+    norm : "unweighted" as printed in Eq. 5, or "mass".
+    """
+
+    about: ClassVar[str] = "contact"
+    begins: ClassVar[float] = 0.0
+    lasts: ClassVar[float] = 0.0
+
+    norm: str = "unweighted"
+    integrator: str = "sap"
+    step: float = 1 / 60
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.integrator not in INTEGRATORS:
+            valid = ", ".join(INTEGRATORS)
+            raise ValueError(f"integrator is {self.integrator!r}: valid are {valid}")
+        if not 0 < self.step < float("inf"):
+            raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
+
+    @property
+    def first_step(self) -> float:
+        """See the base class."""
+        return max(1, ceil(self.begins / self.step))
+
+    @property
+    def usual_steps(self) -> int:
+        """See the base class."""
+        return max(FEWEST_STEPS, ceil(self.lasts / self.step))
+
+    def has_begun(self, frame: Problem) -> bool:
+        """See the base class: whether a vertex is in an obstacle's margin, if there are any."""
+        contact = self.contact()
+        return contact is None or contact.touches(frame.target)
+
+    def material(self) -> Material:
+        """The constants of Tang et al. 2022, section 5; without the energies not needed."""
+        return Material().only(self.needs)
+
+    def contact(self) -> Contact | None:
+        """What the sheet is kept off, or None."""
+        return None
+
+    def force(
+        self,
+        positions: FloatArray,  # noqa: ARG002
+        velocities: FloatArray,  # noqa: ARG002
+        time: float,  # noqa: ARG002
+    ) -> FloatArray | None:
+        """(n, 3) explicit forces [N] besides gravity, or None if there are none.
+
+        Parameters
+        ----------
+        positions : (n, 3) [m], at the start of the sub-step.
+        velocities : (n, 3) [m/s], at the start of the step.
+        time : [s], at the end of the sub-step.
+        """
+        return None
+
+    def cloth(self) -> Cloth:
+        """The sheet's masses and energies."""
+        rest, elements, _, pinned = self.sheet()
+        return Cloth(rest, elements, self.material(), pinned, self.contact())
+
+    def mass(self) -> FloatArray:
+        """(n,) [kg], lumped at the vertices."""
+        return self.cloth().mass
+
+    def pin_positions(self, time: float) -> FloatArray | None:  # noqa: ARG002
+        """(p, 3) where the pins are at `time` [m], or None if they never move."""
+        return None
+
+    def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
+        """Time steps from rest; see the base class."""
+        cloth = self.cloth()
+        positions = self.sheet()[2]
+        motion = Motion(positions, np.zeros_like(positions), 0.0)
+        scheme = INTEGRATORS[self.integrator]
+        _ = cloth.linear_solver  # sparsity and ordering, once a mesh: part of no step
+        while True:
+            step = _Step(self, cloth, motion.velocities)
+            motion = scheme(motion, self.step, step.minimise, project)
+            yield step.report(motion)
+            if "inertia" not in self.needs:
+                motion = Motion(motion.positions, np.zeros_like(positions), motion.time)
+
+
+class _Step:
+    """The minimisations of one time step, and what they cost."""
+
+    def __init__(self, scene: ClothScenario, cloth: Cloth, velocities: FloatArray) -> None:
+        self.scene, self.cloth, self.velocities = scene, cloth, velocities
+        self.settings = NewtonSettings()
+        self.gravity = GRAVITY if "gravity" in scene.needs else np.zeros(3)
+        self.seconds, self.pin_work = 0.0, 0.0
+        self.newton: list[NewtonReport] = []
+
+    def minimise(
+        self, start: FloatArray, inertial: FloatArray, step: float, time: float
+    ) -> FloatArray:
+        """The candidate of a sub-step, with the pins where the scene has them at `time`."""
+        begin = perf_counter()
+        pinned, first = self.cloth.pinned, start.copy()
+        where = self.scene.pin_positions(time)
+        first[pinned] = start[pinned] if where is None else where
+        inertial = inertial + step**2 * (self.gravity - GRAVITY)  # the schemes add it to all
+        push = self.scene.force(start, self.velocities, time)
+        if push is not None:
+            inertial = inertial + step**2 * push / self.cloth.mass[:, None]
+        found, report = minimise_step(self.cloth, first, inertial, step, self.settings)
+        self.seconds += perf_counter() - begin
+        self.newton.append(report)
+        if where is not None:
+            inertia = self.cloth.mass[:, None] * (found - inertial) / step**2
+            gradient = self.cloth.energies(found)[-1]
+            self.cloth.add_contact_gradient(found, gradient)
+            force = (gradient + inertia)[pinned]
+            self.pin_work += float(np.sum(force * (found - start)[pinned]))
+        return found
+
+    def report(self, motion: Motion) -> StepReport:
+        """The step's costs, and energy and momentum after it."""
+        mass, v = self.cloth.mass[:, None], motion.velocities
+        membrane, bending, gradient = self.cloth.energies(motion.positions)
+        contact = self.cloth.contact
+        momentum = np.sum(mass * v, axis=0)
+        return StepReport(
+            time=motion.time,
+            ie_seconds=self.seconds,
+            newton_iterations=sum(r.iterations for r in self.newton),
+            newton_converged=all(r.converged for r in self.newton),
+            assembly_seconds=sum(r.assembly_seconds for r in self.newton),
+            factorisation_seconds=sum(r.factorisation_seconds for r in self.newton),
+            line_search_seconds=sum(r.line_search_seconds for r in self.newton),
+            kinetic_energy=0.5 * float(np.sum(mass * v**2)),
+            gravity_energy=-float(np.sum(mass * motion.positions @ self.gravity[:, None])),
+            membrane_energy=membrane,
+            bending_energy=bending,
+            momentum_x=float(momentum[0]),
+            momentum_y=float(momentum[1]),
+            momentum_z=float(momentum[2]),
+            pin_work=self.pin_work,
+            contact_energy=self.cloth.add_contact_gradient(motion.positions, gradient),
+            penetration=contact.penetration(motion.positions) if contact else 0.0,
+        )
