@@ -195,14 +195,12 @@ def _enough(problem: Problem, positions: FloatArray, multipliers: FloatArray) ->
 
 def _reference_solvers(problem: Problem) -> list[Solver]:
     """The solvers of references, in turn; none where only a missing one takes lower bounds."""
-    if problem.convex:
-        names = (REFERENCE_SOLVER, SLOW_SOLVER, *LAST_SOLVERS)
-        solvers = [find_solver(name) for name in names]
-        return [solver for solver in solvers if not solver.supports(problem)]
+    names = (REFERENCE_SOLVER, SLOW_SOLVER, *LAST_SOLVERS) if problem.convex else (LOCAL_SOLVER,)
     try:
-        return [find_solver(LOCAL_SOLVER)]
+        solvers = [find_solver(name) for name in names]
     except UnavailableError:
         return []
+    return [solver for solver in solvers if not solver.supports(problem)]
 
 
 def reference_of(problem: Problem) -> Reference:
