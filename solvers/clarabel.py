@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.problem.conic import ConicForm
+from strainbench.problem.kinds import Sampled
 from strainbench.solver.claim import claimed
 
 CONES = {
@@ -65,7 +66,7 @@ class Clarabel(Solver):
 
     def supports(self, problem: Problem) -> str | None:
         """Eq. 12 has no form for exact limits."""
-        if problem.limits.spectral and self.form == "paper":
+        if self.form == "paper" and not isinstance(problem.kind, Sampled):
             return "Eq. 12 has no form for exact limits, only for sampled directions"
         return super().supports(problem)
 
