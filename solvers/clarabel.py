@@ -66,9 +66,10 @@ class Clarabel(Solver):
 
     def supports(self, problem: Problem) -> str | None:
         """Eq. 12 has no form for exact limits."""
-        if self.form == "paper" and not isinstance(problem.kind, Sampled):
+        refusal = super().supports(problem)
+        if self.form == "paper" and not refusal and not isinstance(problem.kind, Sampled):
             return "Eq. 12 has no form for exact limits, only for sampled directions"
-        return super().supports(problem)
+        return refusal
 
     def prepare(self, problem: Problem) -> QuadraticForm | PaperForm:
         """The matrices and Clarabel's symbolic factorisation."""

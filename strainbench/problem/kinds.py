@@ -17,8 +17,9 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from strainbench.arrays import FloatArray, IntArray
+from strainbench.arrays import FloatArray, IntArray, frozen_array
 from strainbench.problem.limits import StretchLimits
 from strainbench.problem.reach import gauge
 
@@ -48,9 +49,11 @@ class Kind(ABC):
     cone: ClassVar[Literal["second-order", "semidefinite"] | None] = None
 
     def __init__(
-        self, directions: FloatArray, bounds: FloatArray, lower: FloatArray | None = None
+        self, directions: ArrayLike, bounds: ArrayLike, lower: ArrayLike | None = None
     ) -> None:
-        self.directions, self.bounds, self.lower = directions, bounds, lower
+        self.directions = frozen_array("limits.directions", directions, 2)
+        self.bounds = frozen_array("limits.bounds", bounds, 1, 2)
+        self.lower = None if lower is None else frozen_array("limits.lower", lower, 1, 2)
 
     @property
     @abstractmethod

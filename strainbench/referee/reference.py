@@ -210,7 +210,7 @@ def reference_of(problem: Problem) -> Reference:
 
 def content_key(problem: Problem) -> str:
     """A digest of everything that the optimum depends on, and of who found it."""
-    digest = hashlib.sha256(f"{REFERENCE_SOLVER} {TOLERANCE}".encode())
+    digest = hashlib.sha256(f"{REFERENCE_SOLVER} {TOLERANCE} {problem.kind.formula}".encode())
     for array in (
         problem.row_vertices,
         problem.row_coefficients,
