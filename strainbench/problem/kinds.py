@@ -65,7 +65,7 @@ class Kind(ABC):
         """(constraints,) what is bounded, of `rows` (rows of G, 3) of G x."""
 
     @abstractmethod
-    def tightened(self, margin: float) -> StretchLimits | Kind:
+    def tightened(self, margin: float) -> Limits:
         """The same limits with all bounds lowered by `margin`, lower ones raised; G stays."""
 
     @property
@@ -90,7 +90,7 @@ class Kind(ABC):
         """(e, p) an upper bound on the length of material `vectors` (e, p, dim); infinite here."""
         return np.full(vectors.shape[:-1], np.inf)
 
-    def first(self) -> StretchLimits | Kind:
+    def first(self) -> Limits:
         """Those of the first element, for all elements of another mesh."""
         return self
 
@@ -104,6 +104,10 @@ class Kind(ABC):
         for name, array in (("bounds", self.bounds), ("lower", self.lower)):
             if array is not None and array.ndim == 2 and len(array) != elements:
                 raise ValueError(f"limits.{name}: {len(array)} rows for {elements} elements")
+
+
+Limits = StretchLimits | Kind
+"""What a problem takes as its limits."""
 
 
 class Sampled(Kind):
@@ -132,9 +136,10 @@ class Sampled(Kind):
         return self.measure(multipliers)
 
     def derivatives(self, rows: FloatArray, active: IntArray) -> tuple[IntArray, FloatArray]:
-        """Each constraint has one row y, and derivative y / ||y||."""
+        """Each constraint has one row y, and derivative y / ||y||; 0 at y = 0, which has none."""
         y = rows[active]
-        return active[:, None], (y / np.linalg.norm(y, axis=1, keepdims=True))[:, None]
+        lengths = np.linalg.norm(y, axis=1, keepdims=True)
+        return active[:, None], (y / np.where(lengths > 0, lengths, 1.0))[:, None]
 
     def longest(self, vectors: FloatArray) -> FloatArray:
         """With e = sum_j c_j d_j, ||F e|| <= sum_j |c_j| b_j, the least over all coefficients."""

@@ -23,8 +23,7 @@ from numpy.typing import ArrayLike
 from strainbench.arrays import FloatArray, IntArray, frozen_array, read_only
 from strainbench.problem import checks
 from strainbench.problem.elements import rest_corners, shape_gradients, sparse_rows
-from strainbench.problem.kinds import Kind, kind_of
-from strainbench.problem.limits import StretchLimits
+from strainbench.problem.kinds import Kind, Limits, kind_of
 from strainbench.problem.reach import distances, farthest, longest_edges, pins_apart
 
 Value = TypeVar("Value")
@@ -85,7 +84,7 @@ class Problem:
     rest: FloatArray
     elements: IntArray
     target: FloatArray
-    limits: StretchLimits | Kind
+    limits: Limits
     pinned: IntArray = ()  # type: ignore[assignment]
     mass: FloatArray | None = None
 

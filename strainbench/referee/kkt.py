@@ -63,8 +63,9 @@ def _active_normals(problem: Problem, positions: FloatArray, movable: IntArray) 
     root = np.sqrt(problem.weights[movable, None])
     y = problem.G @ positions
     s = problem.kind.measure(y)
-    upper = np.flatnonzero((s > problem.bounds - NEAR) & (s > 0))
-    lower = np.flatnonzero((s < problem.lower_bounds + NEAR) & (s > 0))
+    upper = np.flatnonzero(s > problem.bounds - NEAR)
+    limited = problem.kind.lower is not None
+    lower = np.flatnonzero(limited & (s < problem.lower_bounds + NEAR))
     sign = np.repeat([1.0, -1.0], [len(upper), len(lower)])
     rows, u = problem.kind.derivatives(y, np.concatenate([upper, lower]))
     u = (sign[:, None, None] * u).reshape(-1, 3)

@@ -70,7 +70,8 @@ def local(problem: Problem, positions: FloatArray) -> Reference:
     """Of a problem that is not convex: nothing is known of other points."""
     stretches = problem.stretches(positions)
     active = stretches > problem.bounds - ACTIVE
-    active |= stretches < problem.lower_bounds + ACTIVE
+    if problem.kind.lower is not None:
+        active |= stretches < problem.lower_bounds + ACTIVE
     nothing = np.full(problem.constraints, np.nan)
     pins, nan = problem.infeasible_pins(), float("nan")
     return Reference(positions, nothing, nan, nan, int(np.sum(active)), pins)

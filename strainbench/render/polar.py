@@ -18,13 +18,11 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.plan import plan_available
 from strainbench.bench.records import open_folder
 from strainbench.escape import chart
-from strainbench.problem.kinds import Kind, Sampled, kind_of
-from strainbench.problem.limits import StretchLimits
+from strainbench.problem.kinds import Limits, Sampled, kind_of
 from strainbench.problem.problem import Problem
 from strainbench.render.film import Film, Track, shoot, untracked
 from strainbench.report.chart import COLOURS
 
-Limits = StretchLimits | Kind
 SUFFIXES = (".svg", ".png", ".pdf")
 ANGLES = np.pi * np.arange(180) / 180 - np.pi / 2
 """[rad] where the cloth's stretch is measured: each degree of half a turn, d and -d being one."""

@@ -239,7 +239,7 @@ def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
         return
     rest, elements = square_grid(2, 1.0, "uniform")
     limits = problem.limits.first()
-    bounds = float(limits.bounds.max())
+    bounds = max(1.0, float(limits.bounds.max()))  # those of other kinds may be no stretches
     toy = Problem(
         rest=rest,
         elements=elements,
