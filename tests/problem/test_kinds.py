@@ -161,6 +161,13 @@ def test_a_local_optimum_has_no_kkt_residual(dim):
     assert problem.largest_objective == np.inf
 
 
+def test_a_measure_near_0_is_no_active_limit():
+    problem = simplex(2, 1.3)
+    flat = problem.target * [1, 1e-6, 1]
+    assert kkt_residual(problem, flat) == pytest.approx(1)
+    assert certify(problem, flat).active_constraints == 0
+
+
 def test_tightened_limits_of_it_are_its_own():
     assert simplex(2, 1.3).tightened(0.01).bounds == pytest.approx([1.2])
 
