@@ -6,7 +6,7 @@ An element's rows of G x are y_j = F d_j for material directions d_j. Limits mea
 
 and a kind says what its measure is: the stretch ||y_j|| in each direction (`Sampled`), the largest
 singular value of all (`Exact`). A third kind is a third class: derive it from `Kind` and give it to
-`Problem` as limits (CONTRIBUTING.md has one of 20 lines). Nothing else in the suite branches on it.
+`Problem` as limits (CONTRIBUTING.md has one of 20 lines). No other file needs to know of it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from strainbench.problem.reach import gauge
 class Kind(ABC):
     """What limits demand of an element: lower <= measure(rows) <= bounds.
 
-    What has a default is what not every kind knows.
+    A kind has `needs`, `formula`, `measure` and `tightened`, and for the referee either `dual_norms`,
+    where its measure is a norm, or `convex = False` and `derivatives`. The rest has defaults.
 
     Parameters
     ----------
