@@ -59,8 +59,9 @@ class StretchSquare(SheetScenario):
         problem = super().problem()
         if self.compression == 1:
             return problem
-        lower = np.full(len(problem.limits.directions), 1 - self.compression)
-        return replace(problem, limits=replace(problem.limits, lower=lower))
+        limits = self.limits()
+        lower = np.full(len(limits.directions), 1 - self.compression)
+        return replace(problem, limits=replace(limits, lower=lower))
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class; the positions are the candidate."""

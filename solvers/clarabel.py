@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.problem.conic import ConicForm
+from strainbench.problem.kinds import Sampled
 from strainbench.solver.claim import claimed
 
 CONES = {
@@ -65,9 +66,10 @@ class Clarabel(Solver):
 
     def supports(self, problem: Problem) -> str | None:
         """Eq. 12 has no form for exact limits."""
-        if problem.limits.spectral and self.form == "paper":
+        refusal = super().supports(problem)
+        if self.form == "paper" and not refusal and not isinstance(problem.kind, Sampled):
             return "Eq. 12 has no form for exact limits, only for sampled directions"
-        return super().supports(problem)
+        return refusal
 
     def prepare(self, problem: Problem) -> QuadraticForm | PaperForm:
         """The matrices and Clarabel's symbolic factorisation."""

@@ -69,7 +69,7 @@ class Cvxpy(Solver):
 
     def supports(self, problem: Problem) -> str | None:
         """A reason, where the backend is missing or has no semidefinite cones."""
-        if problem.limits.spectral and self.backend not in SEMIDEFINITE:
+        if problem.kind.cone == "semidefinite" and self.backend not in SEMIDEFINITE:
             return f"{self.backend} has no semidefinite cones, which exact limits need"
         return super().supports(problem) or self.missing()
 

@@ -31,7 +31,7 @@ class Model:
         self.bounds = cp.Parameter(problem.constraints, nonneg=True)
         G = problem.G[:, problem.free] @ sp.diags_array(1 / self.root[:, 0])
         y = self.stretched + G @ self.z
-        self.exact = problem.limits.spectral
+        self.exact = problem.kind.cone == "semidefinite"
         self.compiler = "SCIPY" if self.exact else None  # the default has no stacks of matrices
         if self.exact:
             self.cones = cp.PSD(matrices(problem, y, self.bounds))

@@ -36,6 +36,7 @@ from solvers.gauss_seidel.strain import polar, strain_change, symmetric, violati
 from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
+from strainbench.problem.kinds import Exact
 
 ENTRIES = np.array([[1, 0], [0, 1], [0.5**0.5, 0.5**0.5], [0.5**0.5, -(0.5**0.5)]])
 """Warp, weft and the two diagonals: what the entries of a strain can limit."""
@@ -45,14 +46,14 @@ SAME = 1e-9
 
 def refusal(constraint: str, problem: Problem) -> str | None:
     """Why the limits cannot be put as limits on what one step corrects, or None."""
-    limits, d = problem.limits, problem.limits.directions
+    d = problem.kind.directions
     if constraint == "directions":
         exact = "it has no form for exact limits; gauss-seidel-principal has"
-        return exact if limits.spectral else None
+        return exact if isinstance(problem.kind, Exact) else None
     if d.shape[1] != 2:
         return f"it clamps the {constraint} of triangles, not of volumes"
     if constraint == "strain":
-        if limits.spectral or not np.all(_along_entries(d).any(axis=1)):
+        if isinstance(problem.kind, Exact) or not np.all(_along_entries(d).any(axis=1)):
             return "it clamps warp, weft and shear: limits at 0, 90 and +-45 degrees alone"
         return None
     balanced = np.allclose(d.T @ d, 0.5 * len(d) * np.eye(2), rtol=0, atol=SAME)
@@ -89,7 +90,7 @@ class Elements:
         gradients = problem.gradients.copy()
         directions = problem.limits.directions
         columns = np.zeros(0, dtype=np.int64)
-        if problem.limits.spectral:
+        if isinstance(problem.kind, Exact):
             gradients = np.swapaxes(problem.row_coefficients.reshape(-1, 2, 3), 1, 2).copy()
             directions = directions[:0]
         if strain:

@@ -72,6 +72,7 @@ from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import NotPositiveDefiniteError
 from strainbench.problem.dual import dual_bound
+from strainbench.problem.kinds import Exact
 
 PATIENCE = 25  # iterations after which a warm start is given up
 WIDTHS = 2e-8, 1e-10, 1e-12, 1e-13  # of wider limits; below, slacks are rounding
@@ -109,7 +110,7 @@ multipliers have no bound, and the referee's may price a violation higher than t
 
     def supports(self, problem: Problem) -> str | None:
         """A reason, where limits are exact and elements are not triangles."""
-        if problem.limits.spectral and problem.elements.shape[1] != 3:
+        if isinstance(problem.kind, Exact) and problem.elements.shape[1] != 3:
             return "its exact limits are those of triangles"
         return super().supports(problem)
 

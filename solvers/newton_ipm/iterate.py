@@ -12,6 +12,7 @@ from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import best_linear_solver
 from strainbench.physics.pattern import Pattern
+from strainbench.problem.kinds import Exact, Kind, Sampled
 
 FLOOR = 3e-3  # least first slack, in b^2
 FIRST_MU = 50.0  # times the guess of the optimum's objective
@@ -25,6 +26,10 @@ BACK_OFF = 0.99
 SNAPSHOT = 0.1  # relative gap
 STRICTER = 100.0  # limits must hold so much better than the gap: they do, but for the last steps
 LARGE = 1e3  # multipliers, of the objective: there may be others that are larger still
+CONES: dict[type[Kind], type[SampledCones | ExactCones]] = {
+    Sampled: SampledCones,
+    Exact: ExactCones,
+}
 ROUNDING = 32 * np.finfo(float).eps  # of a sum of products, as the referee counts it
 
 
@@ -34,8 +39,7 @@ class State:
     def __init__(self, problem: Problem) -> None:
         self.pattern = Pattern.of([problem.elements], problem.vertices, problem.held)
         self.linear = best_linear_solver(self.pattern.matrix())
-        kind = ExactCones if problem.limits.spectral else SampledCones
-        self.cones: SampledCones | ExactCones = kind(problem, self.pattern)
+        self.cones = CONES[type(problem.kind)](problem, self.pattern)
         self.snapshot: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
         self.cold_iterations = 0
         _ = problem.largest_objective  # its shortest paths are kept with the problem

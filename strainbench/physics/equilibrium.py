@@ -37,6 +37,7 @@ from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.linear import NotPositiveDefiniteError
 from strainbench.physics.pattern import scatter
 from strainbench.physics.statics import Equilibrium, potential
+from strainbench.problem.kinds import Sampled
 from strainbench.problem.problem import Problem
 
 
@@ -140,7 +141,7 @@ def equilibrium(
         If the target is not strictly within its limits, or these are not sampled.
     """
     at = _Point(cloth, problem, gravity, problem.target)
-    if problem.limits.spectral or at.q.min() <= 0:
+    if not isinstance(problem.kind, Sampled) or at.q.min() <= 0:
         raise ValueError("target: positions strictly within sampled limits are valid")
     weight = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[cloth.pattern.free]))
     fall = np.linalg.norm(GRAVITY) * cloth.mass.sum() * np.ptp(problem.target, axis=0).max()

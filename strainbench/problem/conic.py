@@ -7,7 +7,8 @@ With the free vertices' displacements u = x - target as unknowns, in units of a 
 where P = s h^2 M. This is Tang et al. 2022, Eq. 12, but for the objective, which is given as a
 quadratic, without a cone of its own. A constraint's block of s is
 
-- (b_i, (G x)_i) in the second-order cone of order 4, or
+- (b_i, (G x)_i) in the second-order cone of order 4; of a larger one where limits bound the length
+  of several rows together; or
 - with exact limits, the matrix [[b I, Y], [Y^T, b I]], positive semidefinite iff ||Y||_2 <= b,
   where Y (3 x dim) has the element's rows of G x as its columns. A block holds one triangle of
   it, column after column, off-diagonal entries times sqrt(2), so that products of blocks are
@@ -19,7 +20,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from strainbench.arrays import FloatArray
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.problem import Problem
 
 
@@ -37,7 +38,8 @@ class ConicForm:
     ----------
     P : (u, u) diagonal, u = 3 times the free vertices, in the order of (free vertices, 3)
     A : (length count, u)
-    cone, order : "second-order" and 4, or "semidefinite" and 3 + dim, the matrices' order
+    cone, order : "second-order" and 1 + 3 times the rows of a constraint, mostly 4, or
+        "semidefinite" and 3 + dim, the matrices' order
     length, count : entries of s in one cone; how many cones
     scale, unit : s, and h [m]
     """
@@ -52,19 +54,18 @@ class ConicForm:
         weights = np.repeat(problem.weights[problem.free], 3)
         self.P = sp.csc_array(sp.diags_array(self.scale * self.unit**2 * weights))
         self.count = problem.constraints
-        if problem.limits.spectral:
-            self.cone, self.order = "semidefinite", 3 + problem.rows // problem.constraints
+        if problem.kind.cone is None:
+            raise ValueError(f"limits {problem.kind.formula} have no cone")
+        self.cone, group = problem.kind.cone, problem.rows // problem.constraints
+        if self.cone == "semidefinite":
+            self.order = 3 + group
             self.length, self._factor = self.order * (self.order + 1) // 2, np.sqrt(2)
-            entry = np.zeros((self.order, self.order), dtype=np.int64)
-            corner = np.tril_indices(self.order)  # row by row: the upper one column by column
-            if triangle == "lower":
-                corner = np.triu_indices(self.order)
-            entry[corner] = np.arange(self.length)
-            entry = np.maximum(entry, entry.T)
+            entry = _places(self.order, triangle)
             self._bound_entries, rows = np.diag(entry), entry[3:, :3]
         else:
-            self.cone, self.order, self.length, self._factor = "second-order", 4, 4, 1.0
-            self._bound_entries, rows = np.array([0]), np.array([[1, 2, 3]])
+            self.order = self.length = 1 + 3 * group
+            self._factor, self._bound_entries = 1.0, np.array([0])
+            rows = 1 + np.arange(3 * group).reshape(group, 3)
         blocks = self.length * np.arange(self.count)[:, None, None]
         self._entries = (blocks + rows).reshape(-1, 3)
         pick = sp.csc_array(
@@ -94,3 +95,13 @@ class ConicForm:
         """(rows, 3) Y from the duals of A u + s = b, in the problem's own units."""
         multipliers: FloatArray = -self._factor * duals[self._entries] / self.scale
         return multipliers
+
+
+def _places(order: int, triangle: str) -> IntArray:
+    """(order, order) where in its cone's block each entry of a symmetric matrix is."""
+    corner = np.tril_indices(order)  # row by row: the upper one column by column
+    if triangle == "lower":
+        corner = np.triu_indices(order)
+    place = np.zeros((order, order), dtype=np.int64)
+    place[corner] = np.arange(len(corner[0]))
+    return np.maximum(place, place.T)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
 
 from strainbench.arrays import FloatArray, IntArray, read_only
 
@@ -41,3 +42,14 @@ def shape_gradients(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, F
     inverse = np.linalg.inv(edges)
     gradients = np.concatenate([-inverse.sum(axis=1, keepdims=True), inverse], axis=1)
     return read_only(gradients), read_only(np.abs(determinant) / (2 if dim == 2 else 6))
+
+
+def sparse_rows(vertices: IntArray, coefficients: FloatArray, count: int) -> sp.csr_array:
+    """(rows, count) the matrix with these `coefficients` (rows, k) at `vertices` (rows, k)."""
+    rows, k = vertices.shape
+    starts = np.arange(0, rows * k + 1, k)
+    entries = coefficients.ravel(), vertices.ravel(), starts
+    matrix = sp.csr_array(entries, shape=(rows, count), copy=True)
+    matrix.sort_indices()
+    matrix.data.setflags(write=False)
+    return matrix

@@ -90,15 +90,11 @@ def as_cbf(problem: Problem, about: str) -> bytes:
     form = ConicForm(problem)
     comments = [
         about,
-        f"minimise t = 1/2 ||x - target||_M^2 such that {_limits(problem)}",
+        f"minimise t = 1/2 ||x - target||_M^2 such that {problem.kind.formula}",
         f"variables 0 to {form.P.shape[0] - 1}: x - target [m] of the free vertices, three each",
         f"variable {form.P.shape[0]}: t",
     ]
     return cbf_text(form, form.constants(problem), comments).encode(errors="backslashreplace")
-
-
-def _limits(problem: Problem) -> str:
-    return "||F_e D||_2 <= b_e" if problem.limits.spectral else "||(G x)_i|| <= b_i"
 
 
 def as_npz(problem: Problem, about: str) -> bytes:
@@ -110,10 +106,7 @@ def as_npz(problem: Problem, about: str) -> bytes:
         "target": problem.target,
         "pinned": problem.pinned,
         **({} if problem.mass is None else {"mass": problem.mass}),
-        "limit_directions": problem.limits.directions,
-        "limit_bounds": problem.limits.bounds,
-        "limit_spectral": problem.limits.spectral,
-        **({} if problem.limits.lower is None else {"limit_lower": problem.limits.lower}),
+        **_limits(problem.limits),
         "bounds": problem.bounds,
         "free": problem.free,
         **_sparse("G", problem.G),
@@ -123,6 +116,17 @@ def as_npz(problem: Problem, about: str) -> bytes:
     plain: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
     np.savez_compressed(buffer, **plain)
     return buffer.getvalue()
+
+
+def _limits(limits: object) -> dict[str, object]:
+    if not isinstance(limits, StretchLimits):
+        raise ValueError("--format npz: limits of another kind than StretchLimits have no arrays")
+    return {
+        "limit_directions": limits.directions,
+        "limit_bounds": limits.bounds,
+        "limit_spectral": limits.spectral,
+        **({} if limits.lower is None else {"limit_lower": limits.lower}),
+    }
 
 
 def _cone_program(problem: Problem) -> dict[str, object]:

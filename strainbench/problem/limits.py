@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +93,11 @@ class StretchLimits:
                 f"limits.lower{index.tolist()} is {least}: at most the bound {largest} is valid"
             )
         return lower
+
+    def first(self) -> StretchLimits:
+        """Those of the first element, for all elements of another mesh."""
+        lower = None if self.lower is None else np.atleast_2d(self.lower)[0]
+        return replace(self, bounds=np.atleast_2d(self.bounds)[0], lower=lower)
 
     @classmethod
     def isotropic(

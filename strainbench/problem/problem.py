@@ -12,19 +12,19 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, TypeVar
+from typing import TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
-from scipy.sparse.csgraph import dijkstra
 
-from strainbench.arrays import FloatArray, IntArray, frozen_array, index_array, read_only
-from strainbench.problem.elements import rest_corners, shape_gradients
-from strainbench.problem.limits import StretchLimits
-from strainbench.problem.reach import longest_edges
+from strainbench.arrays import FloatArray, IntArray, frozen_array, read_only
+from strainbench.problem import checks
+from strainbench.problem.elements import rest_corners, shape_gradients, sparse_rows
+from strainbench.problem.kinds import Kind, Limits, kind_of
+from strainbench.problem.reach import distances, farthest, longest_edges, pins_apart
 
 Value = TypeVar("Value")
 
@@ -57,7 +57,7 @@ class Problem:
     target : (n, 3)
         Candidate positions [m].
     limits : StretchLimits
-        Upper bounds on stretch.
+        Upper bounds on stretch; or those of another `Kind`.
     pinned : (p,)
         Vertices held at their target.
     mass : (n,), optional
@@ -84,7 +84,7 @@ class Problem:
     rest: FloatArray
     elements: IntArray
     target: FloatArray
-    limits: StretchLimits
+    limits: Limits
     pinned: IntArray = ()  # type: ignore[assignment]
     mass: FloatArray | None = None
 
@@ -92,93 +92,41 @@ class Problem:
         def put(name: str, value: object) -> None:
             object.__setattr__(self, name, value)
 
-        put("rest", frozen_array("rest", self.rest, 2, 3))
-        dim = self.rest.shape[-1]
-        if dim not in (2, 3):
-            valid = "(n, 2), (n, 3), (e, 3, 2) and (e, 4, 3)"
-            raise ValueError(f"rest: shape {self.rest.shape}; valid are {valid}")
-        per_corner = self.rest.ndim == 3
-        if per_corner:
+        put("rest", checks.checked_rest(self.rest))
+        if self.rest.ndim == 3:  # the target says how many vertices there are
             put("target", frozen_array("target", self.target, 2))
-        put("elements", index_array("elements", self.elements, 2, self.vertices))
-        if per_corner and self.rest.shape[:2] != self.elements.shape:
-            raise ValueError(
-                f"rest: shape {self.rest.shape} for elements of shape {self.elements.shape}; "
-                f"one material position for each corner of each element is valid"
-            )
-        if len(self.elements) == 0 or self.elements.shape[1] != dim + 1:
-            raise ValueError(
-                f"elements: shape {self.elements.shape}; rest has {dim} coordinates, "
-                f"so (e, {dim + 1}) with at least one element is valid"
-            )
-        put("target", self._checked_target(self.target))
-        put("pinned", self._checked_pins())
-        put("mass", self._checked_mass())
-        if not isinstance(self.limits, StretchLimits):
-            raise ValueError(f"limits: {self.limits!r} is not a StretchLimits")
-        if self.limits.directions.shape[1] != dim:
-            raise ValueError(
-                f"limits.directions: {self.limits.directions.shape[1]} coordinates, "
-                f"but the material space of rest has {dim}"
-            )
-        for name in ("bounds", "lower"):
-            array = getattr(self.limits, name)
-            if array is not None and array.ndim == 2 and len(array) != len(self.elements):
-                raise ValueError(
-                    f"limits.{name}: {len(array)} rows for {len(self.elements)} elements"
-                )
-        put("_shape", shape_gradients(self.rest, self.elements))
+        put("elements", checks.checked_elements(self.elements, self.rest, self.vertices))
+        put("target", checks.checked_target(self.target, self.vertices))
+        put("pinned", checks.checked_pins(self.pinned, self.vertices))
+        if self.mass is not None:
+            put("mass", checks.checked_mass(self.mass, self.vertices))
+        self.kind.check(self.rest.shape[-1], len(self.elements))
         put("_mesh", {})
-
-    def _checked_target(self, target: ArrayLike) -> FloatArray:
-        array = frozen_array("target", target, 2)
-        n = self.vertices
-        if array.shape != (n, 3):
-            raise ValueError(
-                f"target: shape {array.shape}, but rest has {n} vertices, so ({n}, 3) is valid"
-            )
-        return array
-
-    def _checked_pins(self) -> IntArray:
-        pins = index_array("pinned", self.pinned, 1, self.vertices)
-        values, counts = np.unique(pins, return_counts=True)
-        for vertex in values[counts > 1][:1]:
-            second = np.flatnonzero(pins == vertex)[1]
-            raise ValueError(f"pinned[{second}] is {vertex}: this vertex is pinned already")
-        return pins
-
-    def _checked_mass(self) -> FloatArray | None:
-        if self.mass is None:
-            return None
-        mass = frozen_array("mass", self.mass, 1)
-        if len(mass) != self.vertices:
-            raise ValueError(f"mass: {len(mass)} entries for {self.vertices} vertices")
-        for vertex in np.flatnonzero(mass <= 0)[:1]:
-            raise ValueError(f"mass[{vertex}] is {mass[vertex]}: a mass must be above 0")
-        return mass
+        _ = self._shape  # finds flat elements
 
     def with_target(self, target: ArrayLike) -> Problem:
         """The same mesh, limits and pins with other candidate positions (n, 3) [m]."""
         other = copy.copy(self)
-        object.__setattr__(other, "target", self._checked_target(target))
+        object.__setattr__(other, "target", checks.checked_target(target, self.vertices))
         return other
 
     def tightened(self, margin: float) -> Problem:
         """The same projection with every bound lowered by `margin`, every lower one raised."""
         other = copy.copy(self)
-        limits = self.limits
-        if limits.spectral:  # D stays as it is
-            bounds = limits.bounds * (1 - margin / limits.bounds.min(axis=-1, keepdims=True))
-        else:
-            bounds = limits.bounds - margin
-        lower = None if limits.lower is None else limits.lower + margin
-        object.__setattr__(other, "limits", replace(limits, bounds=bounds, lower=lower))
-        mesh = {k: v for k, v in self._mesh.items() if k not in ("bounds", "lower_bounds")}  # type: ignore[attr-defined]
-        mesh["_reach"] = self._reach * float(np.max(bounds / limits.bounds))
-        object.__setattr__(other, "_mesh", mesh)
-        for name in ("bounds", "lower_bounds", "_reach"):
+        object.__setattr__(other, "limits", self.kind.tightened(margin))
+        own = ("kind", "bounds", "lower_bounds", "_reach")
+        for name in own:
             other.__dict__.pop(name, None)
+        mesh = {k: v for k, v in self._mesh.items() if k not in own}  # type: ignore[attr-defined]
+        if self.convex:  # a norm's unit ball grows by no more
+            mesh["_reach"] = self._reach * float(np.max(other.kind.bounds / self.kind.bounds))
+        object.__setattr__(other, "_mesh", mesh)
         return other
+
+    @cached_property
+    def kind(self) -> Kind:
+        """What the limits demand of an element, by their kind."""
+        return kind_of(self.limits)
 
     @property
     def vertices(self) -> int:
@@ -188,29 +136,31 @@ class Problem:
     @property
     def rows(self) -> int:
         """Rows of G: elements times limited directions."""
-        return len(self.elements) * len(self.limits.directions)
+        return len(self.elements) * len(self.kind.directions)
 
     @property
     def constraints(self) -> int:
         """Number of constraints: one a row of G, or one an element where limits are exact."""
-        return len(self.elements) if self.limits.spectral else self.rows
+        return len(self.elements) * int(self.kind.bounds.shape[-1])
 
     @property
     def convex(self) -> bool:
         """Whether there are no lower bounds: then the optimum is unique, and certified."""
-        return self.limits.lower is None
+        return self.kind.convex
+
+    @_of_mesh
+    def _shape(self) -> tuple[FloatArray, FloatArray]:
+        return shape_gradients(self.rest, self.elements)
 
     @property
     def gradients(self) -> FloatArray:
         """(e, k, dim) shape function gradients B [1/m]: F_e = sum_k x_k B_k."""
-        gradients: FloatArray = self._shape[0]  # type: ignore[attr-defined]
-        return gradients
+        return self._shape[0]
 
     @property
     def measures(self) -> FloatArray:
         """(e,) rest areas [m^2] of triangles, or volumes [m^3] of tetrahedra."""
-        measures: FloatArray = self._shape[1]  # type: ignore[attr-defined]
-        return measures
+        return self._shape[1]
 
     @_of_mesh
     def used(self) -> IntArray:
@@ -263,74 +213,47 @@ class Problem:
     @_of_mesh
     def row_vertices(self) -> IntArray:
         """(rows, k) vertices of each row of G; row e m + j is element e, direction j."""
-        vertices = np.repeat(self.elements, len(self.limits.directions), axis=0)
-        vertices.setflags(write=False)
-        return vertices
+        return read_only(np.repeat(self.elements, len(self.kind.directions), axis=0))
 
     @_of_mesh
     def row_coefficients(self) -> FloatArray:
         """(rows, k) entries B_k . d of each row of G [1/m]; exact limits scale each axis by D."""
-        per_element: FloatArray = np.einsum("ekc,mc->emk", self.gradients, self.limits.directions)
-        if self.limits.spectral:
-            axes = np.atleast_2d(self.limits.bounds)
-            per_element = per_element * (axes.min(axis=1, keepdims=True) / axes)[:, :, None]
-        return read_only(per_element.reshape(self.rows, -1))
+        return read_only(self.kind.coefficients(self.gradients).reshape(self.rows, -1))
 
     @_of_mesh
     def G(self) -> sp.csr_array:  # noqa: N802
         """(rows, n) sparse: (G x)_i = F_e d, the deformed direction of constraint i."""
-        k = self.elements.shape[1]
-        starts = np.arange(0, self.rows * k + 1, k)
-        G = sp.csr_array(
-            (self.row_coefficients.ravel(), self.row_vertices.ravel(), starts),
-            shape=(self.rows, self.vertices),
-            copy=True,
-        )
-        G.sort_indices()
-        G.data.setflags(write=False)
-        return G
+        return sparse_rows(self.row_vertices, self.row_coefficients, self.vertices)
 
     @_of_mesh
     def bounds(self) -> FloatArray:
         """(constraints,) largest stretch b_i; with exact limits that of the tightest axis."""
-        bounds = self.limits.bounds
-        if self.limits.spectral:
-            bounds = bounds.min(axis=-1, keepdims=True)
-        shape = (len(self.elements), bounds.shape[-1])
-        return read_only(np.broadcast_to(bounds, shape).reshape(-1).copy())
+        return self._by_constraint(self.kind.bounds)
 
     @_of_mesh
     def lower_bounds(self) -> FloatArray:
         """(constraints,) least stretch; 0 without lower bounds."""
-        lower = np.zeros(1) if self.limits.lower is None else self.limits.lower
-        per_element = self.constraints // len(self.elements)
-        shape = (len(self.elements), per_element)
-        return read_only(np.broadcast_to(lower, shape).reshape(-1).copy())
+        return self._by_constraint(np.zeros(1) if self.kind.lower is None else self.kind.lower)
+
+    def _by_constraint(self, values: FloatArray) -> FloatArray:
+        shape = (len(self.elements), self.kind.bounds.shape[-1])
+        return read_only(np.broadcast_to(values, shape).reshape(-1).copy())
 
     def stretches(self, positions: FloatArray) -> FloatArray:
         """(constraints,) stretch at `positions` (n, 3): ||(G x)_i||, or ||F D||_2 min(bounds)."""
-        return self._norms(self.G @ positions, 2)
+        return self.kind.measure(self.G @ positions)
 
     def dual_norms(self, multipliers: FloatArray) -> FloatArray:
         """(constraints,) |Y_i| of `multipliers` (rows, 3), or nuclear norms of exact limits."""
-        return self._norms(multipliers, "nuc")
-
-    def _norms(self, rows: FloatArray, order: Literal[2, "nuc"]) -> FloatArray:
-        """(constraints,) of (rows, 3): vector norms, or matrix norms with exact limits."""
-        if self.limits.spectral:
-            blocks = rows.reshape(len(self.elements), -1, 3)
-            finite = np.isfinite(blocks).all(axis=(1, 2))  # numpy raises for others
-            norms: FloatArray = np.full(len(blocks), np.nan)
-            norms[finite] = np.linalg.norm(blocks[finite], order, axis=(1, 2))
-        else:
-            norms = np.linalg.norm(rows, axis=1)
-        return norms
+        return self.kind.dual_norms(multipliers)
 
     def violations(self, positions: FloatArray) -> FloatArray:
         """(constraints,) max(0, stretch - b_i), or what it lacks to its lower bound."""
         stretches = self.stretches(positions)
         beyond = np.maximum(0.0, stretches - self.bounds)
-        return beyond if self.convex else np.maximum(beyond, self.lower_bounds - stretches)
+        if self.kind.lower is None:
+            return beyond
+        return np.maximum(beyond, self.lower_bounds - stretches)
 
     def deformation_gradients(self, positions: FloatArray) -> FloatArray:
         """(e, 3, dim) F_e at `positions` (n, 3)."""
@@ -351,40 +274,21 @@ class Problem:
         """
         if len(self.pinned) < 2:
             return None
-        lengths = self._reach[:, self.pinned]
-        pins = self.target[self.pinned]
-        apart: FloatArray = np.hypot.reduce(pins[:, None] - pins[None], axis=2)
-        excess = np.zeros_like(apart)
-        np.subtract(apart, lengths, out=excess, where=apart > lengths * (1 + 1e-12))
-        i, j = np.unravel_index(int(np.argmax(excess)), excess.shape)
-        if excess[i, j] <= 0:
-            return None
-        return (
-            f"infeasible: pinned vertices {self.pinned[i]} and {self.pinned[j]} are "
-            f"{apart[i, j]:.6g} m apart, and the limits allow at most {lengths[i, j]:.6g} m"
-        )
+        return pins_apart(self._reach[:, self.pinned], self.target, self.pinned)
 
     @property
     def largest_objective(self) -> float:
         """An upper bound on the objective of any feasible point; infinite without pins."""
         if len(self.pinned) == 0:
             return float("inf")
-        nearest = np.argmin(self._reach[:, self.free], axis=0)
-        pins = self.target[self.pinned[nearest]]
-        farthest = np.linalg.norm(self.target[self.free] - pins, axis=1)
-        farthest += self._reach[nearest, self.free]
-        return 0.5 * float(np.sum(self.weights[self.free] * farthest**2))
+        far = farthest(self._reach[:, self.free], self.target[self.pinned], self.target[self.free])
+        return 0.5 * float(np.sum(self.weights[self.free] * far**2))
 
     def longest_edges(self) -> tuple[IntArray, FloatArray]:
         """(k, 2) edges, and (k,) how long the limits let each become [m]."""
-        return longest_edges(rest_corners(self.rest, self.elements), self.elements, self.limits)
+        return longest_edges(rest_corners(self.rest, self.elements), self.elements, self.kind)
 
     @_of_mesh
     def _reach(self) -> FloatArray:
         """(p, n) an upper bound on the distance of each vertex from each pin [m]."""
-        if len(self.pinned) == 0:
-            return read_only(np.zeros((0, self.vertices)))
-        edges, lengths = self.longest_edges()
-        graph = sp.csr_array((lengths, (edges[:, 0], edges[:, 1])), shape=2 * (self.vertices,))
-        reach: FloatArray = dijkstra(graph, directed=False, indices=self.pinned)
-        return reach
+        return distances(*self.longest_edges(), self.vertices, self.pinned)

@@ -1,6 +1,7 @@
 """How far positions are from a local optimum: the residual of the KKT conditions, from x alone.
 
-With s_i(x) = ||(G x)_i|| and u_i = (G x)_i / s_i, a local optimum of
+With s_i(x) = ||(G x)_i|| and u_i = (G x)_i / s_i, or what else a kind of limit measures and its
+derivative, a local optimum of
 
     minimise 1/2 ||x - target||_M^2  subject to  l_i <= s_i(x) <= b_i
 
@@ -40,10 +41,8 @@ def kkt_residual(problem: Problem, positions: FloatArray) -> float:
     Raises
     ------
     ValueError
-        If the limits are exact: their constraint is no single direction's.
+        If the limits are exact: their measure has no derivative where singular values are equal.
     """
-    if problem.limits.spectral:
-        raise ValueError("limits: the KKT residual is that of sampled directions")
     movable = np.setdiff1d(np.arange(problem.vertices), problem.pinned)
     if len(movable) == 0:
         return 0.0
@@ -63,14 +62,16 @@ def _active_normals(problem: Problem, positions: FloatArray, movable: IntArray) 
     """(3 movable, active) outward normals M^-1/2 g_i u_i of the active limits, of unit length."""
     root = np.sqrt(problem.weights[movable, None])
     y = problem.G @ positions
-    s = np.linalg.norm(y, axis=1)
-    upper = np.flatnonzero((s > problem.bounds - NEAR) & (s > 0))
-    lower = np.flatnonzero((s < problem.lower_bounds + NEAR) & (s > 0))
-    rows = np.concatenate([upper, lower])
+    s = problem.kind.measure(y)
+    upper = np.flatnonzero(s > problem.bounds - NEAR)
+    limited = problem.kind.lower is not None
+    lower = np.flatnonzero(limited & (s < problem.lower_bounds + NEAR))
     sign = np.repeat([1.0, -1.0], [len(upper), len(lower)])
-    u = sign[:, None] * y[rows] / s[rows, None]
-    g = sp.csc_array(problem.G[rows][:, movable].T / root)
-    normals = sp.csc_array(sp.vstack([g * a for a in u.T]))
+    rows, u = problem.kind.derivatives(y, np.concatenate([upper, lower]))
+    u = (sign[:, None, None] * u).reshape(-1, 3)
+    g = sp.csc_array(problem.G[rows.ravel()][:, movable].T / root)
+    together = sp.kron(sp.eye_array(len(rows)), np.ones((rows.shape[1], 1)))
+    normals = sp.csc_array(sp.vstack([g * a for a in u.T]) @ together)
     length = sp.linalg.norm(normals, axis=0)
     turns = length > 0
     return sp.csc_array(normals[:, turns] / length[turns])

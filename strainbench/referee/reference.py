@@ -83,7 +83,8 @@ def local(problem: Problem, positions: FloatArray) -> Reference:
     """Of a problem that is not convex: nothing is known of other points."""
     stretches = problem.stretches(positions)
     active = stretches > problem.bounds - ACTIVE
-    active |= stretches < problem.lower_bounds + ACTIVE
+    if problem.kind.lower is not None:
+        active |= stretches < problem.lower_bounds + ACTIVE
     nothing = np.full(problem.constraints, np.nan)
     pins, nan = problem.infeasible_pins(), float("nan")
     return Reference(positions, nothing, nan, nan, int(np.sum(active)), pins)
@@ -226,14 +227,12 @@ def _enough(problem: Problem, positions: FloatArray, multipliers: FloatArray) ->
 
 def _reference_solvers(problem: Problem) -> list[Solver]:
     """The solvers of references, in turn; none where only a missing one takes lower bounds."""
-    if problem.convex:
-        names = (REFERENCE_SOLVER, SLOW_SOLVER, *LAST_SOLVERS)
-        solvers = [find_solver(name) for name in names]
-        return [solver for solver in solvers if not solver.supports(problem)]
+    names = (REFERENCE_SOLVER, SLOW_SOLVER, *LAST_SOLVERS) if problem.convex else (LOCAL_SOLVER,)
     try:
-        return [find_solver(LOCAL_SOLVER)]
+        solvers = [find_solver(name) for name in names]
     except UnavailableError:
         return []
+    return [solver for solver in solvers if not solver.supports(problem)]
 
 
 def reference_of(problem: Problem) -> Reference:
@@ -243,7 +242,7 @@ def reference_of(problem: Problem) -> Reference:
 
 def content_key(problem: Problem) -> str:
     """A digest of everything that the optimum depends on, and of who found it."""
-    digest = hashlib.sha256(f"{REFERENCE_SOLVER} {TOLERANCE}".encode())
+    digest = hashlib.sha256(f"{REFERENCE_SOLVER} {TOLERANCE} {problem.kind.formula}".encode())
     for array in (
         problem.row_vertices,
         problem.row_coefficients,

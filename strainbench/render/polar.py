@@ -18,7 +18,7 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.plan import plan_available
 from strainbench.bench.records import open_folder
 from strainbench.escape import chart
-from strainbench.problem.limits import StretchLimits
+from strainbench.problem.kinds import Limits, Sampled, kind_of
 from strainbench.problem.problem import Problem
 from strainbench.render.film import Film, Track, shoot, untracked
 from strainbench.report.chart import COLOURS
@@ -41,23 +41,30 @@ def directional_stretches(
     return stretches
 
 
-def sampled_curve(limits: StretchLimits) -> tuple[FloatArray, FloatArray]:
-    """Angles (m,) [rad] and bounds (m,) of the samples; of the loosest element where they vary."""
+def sampled_curve(limits: Limits) -> tuple[FloatArray, FloatArray] | None:
+    """Angles (m,) [rad] and bounds (m,) of the samples; of the loosest element where they vary.
+
+    None where limits are not sampled.
+    """
+    if not isinstance(kind_of(limits), Sampled):
+        return None
     angles = np.arctan2(limits.directions[:, 1], limits.directions[:, 0])
     return angles, np.atleast_2d(limits.bounds).max(axis=0)
 
 
-def admissible(limits: StretchLimits, angles: FloatArray) -> FloatArray:
-    """(a,) largest stretch at `angles` that the samples alone admit; infinite where they do not.
+def admissible(limits: Limits, angles: FloatArray) -> FloatArray:
+    """(a,) largest stretch at `angles` that the limits admit; infinite where they do not say.
 
     With C = F^T F = [[p + q, r], [r, p - q]], ||F d(a)||^2 = p + q cos 2a + r sin 2a is linear.
-    So this is a linear objective over the samples' half-planes and the cone C >= 0. Exact limits
-    admit ||D^-1 d||.
+    So with samples this is a linear objective over their half-planes and the cone C >= 0. Other
+    kinds of limits know how long they let a unit vector become.
     """
-    samples, bounds = sampled_curve(limits)
-    if limits.spectral:
-        longest: FloatArray = np.hypot(np.cos(angles) * bounds[0], np.sin(angles) * bounds[1])
+    curve = sampled_curve(limits)
+    if curve is None:
+        unit = np.column_stack([np.cos(angles), np.sin(angles)])
+        longest: FloatArray = kind_of(limits).longest(unit[None]).max(axis=0)
         return longest
+    samples, bounds = curve
     cone = np.pi * np.arange(TANGENTS) / TANGENTS
     A = np.concatenate([_squared_stretch(samples), -_squared_stretch(cone)])
     b = np.concatenate([bounds**2, np.zeros(TANGENTS)])
@@ -144,18 +151,19 @@ def _closed(angles: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 def _draw_limits(
-    ax: PolarAxes, limits: StretchLimits, curve: tuple[FloatArray, FloatArray] | None
+    ax: PolarAxes, limits: Limits, curve: tuple[FloatArray, FloatArray] | None
 ) -> None:
     if curve is not None:
         turn, bounds = _closed(*curve)
         ax.plot(turn, 100 * (bounds - 1), color="black", lw=1.2, label="limit")
     reach = 100 * (admissible(limits, ANGLES) - 1)
-    if limits.spectral:
-        if curve is None:
+    samples = sampled_curve(limits)
+    if samples is None:
+        if curve is None and np.all(np.isfinite(reach)):
             ax.plot(*_closed(ANGLES, reach), color="black", lw=1.2, label="limit")
         return
-    angles, bounds = sampled_curve(limits)
-    samples = "sample" if len(bounds) == 1 else f"{len(bounds)} samples"
+    angles, bounds = samples
+    its = "sample" if len(bounds) == 1 else f"{len(bounds)} samples"
     ax.plot(
         *_closed(angles, 100 * (bounds - 1)),
         linestyle="none",
@@ -164,7 +172,7 @@ def _draw_limits(
         markerfacecolor="white",
         markeredgecolor="black",
         zorder=5,
-        label=f"its {samples}" if curve is not None else f"limit: {samples}",
+        label=f"its {its}" if curve is not None else f"limit: {its}",
     )
     if np.all(np.isfinite(reach)):
         ax.plot(
@@ -195,7 +203,7 @@ def _draw_film(ax: PolarAxes, film: Film, strain: FloatArray, colour: str, top: 
     )
 
 
-def _top(limits: StretchLimits, strains: Sequence[FloatArray]) -> float:
+def _top(limits: Limits, strains: Sequence[FloatArray]) -> float:
     """End of the axis [%]: room for the limits, and for strains that are not far beyond them."""
     reach = admissible(limits, ANGLES)
     loosest = 100 * max(float(limits.bounds.max()), *reach[np.isfinite(reach)]) - 100

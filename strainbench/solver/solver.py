@@ -13,7 +13,6 @@ import numpy as np
 from strainbench.arrays import FloatArray
 from strainbench.fields import same, spelled
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import StretchLimits
 from strainbench.problem.problem import Problem
 
 Watch = Callable[[float, int, FloatArray, FloatArray | None], None]
@@ -106,7 +105,8 @@ class Solver(ABC):
     A field `warm: bool = False` says that the method can start from the frame before, which it
     then keeps in its `state` (`strainbench.solver.memory`): `--start warm` sets it.
     `takes_exact` says that the method has a form for exact limits, `takes_lower` that it has one
-    for lower bounds, which are not convex.
+    for lower bounds, which are not convex; other kinds of limits name the declaration that they
+    need (`strainbench.problem.kinds`).
     """
 
     name: ClassVar[str]
@@ -116,10 +116,9 @@ class Solver(ABC):
 
     def supports(self, problem: Problem) -> str | None:
         """None, or the reason why this method cannot take the problem."""
-        if problem.limits.spectral and not self.takes_exact:
-            return "it has no form for exact limits, only for sampled directions"
-        if not (problem.convex or self.takes_lower):
-            return "it has no form for lower bounds, which are not convex"
+        for declaration, reason in problem.kind.needs.items():
+            if not getattr(self, declaration, False):
+                return reason
         return None
 
     def missing(self) -> str | None:
@@ -239,14 +238,13 @@ def warm_up(solver: Solver, problem: Problem, tolerance: float) -> None:
     if problem.rest.shape[-1] != 2:
         return
     rest, elements = square_grid(2, 1.0, "uniform")
-    limits = problem.limits
-    bounds = np.atleast_2d(limits.bounds)[0]
-    lower = None if limits.lower is None else np.atleast_2d(limits.lower)[0]
+    limits = problem.limits.first()
+    bounds = max(1.0, float(limits.bounds.max()))  # those of other kinds may be no stretches
     toy = Problem(
         rest=rest,
         elements=elements,
-        target=np.column_stack([2 * bounds.max() * rest, 0.1 * rest[:, 0]]),
-        limits=StretchLimits(limits.directions, bounds, limits.spectral, lower),
+        target=np.column_stack([2 * bounds * rest, 0.1 * rest[:, 0]]),
+        limits=limits,
         pinned=np.array([0]) if len(problem.pinned) else np.array([], dtype=np.int64),
         mass=None if problem.mass is None else np.linspace(1.0, 2.0, len(rest)),
     )
