@@ -11,9 +11,9 @@ from scipy.optimize import brentq
 from scipy.special import j0
 
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.physics.body import gravity_of
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.equilibrium import BarrierSettings, equilibrium
-from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.statics import Equilibrium, StaticsSettings, constrained_minimum
 from strainbench.problem.grid import square_grid
 from strainbench.problem.limits import StretchLimits
@@ -120,17 +120,13 @@ class Drape(Scenario):
     def cloth(self) -> Cloth:
         """The sheet's masses and energies."""
         rest, elements, _, pinned = self.sheet()
-        return Cloth(rest, elements, Material().only(self.needs), pinned)
+        material, gravity = Material().only(self.needs), gravity_of(self.needs)
+        return Cloth(rest, elements, material, pinned, gravity=gravity)
 
     def problem(self) -> Problem:
         """The projection in the norm of the masses."""
         rest, elements, positions, pinned = self.sheet()
         return Problem(rest, elements, positions, self.limits(), pinned, self.cloth().mass)
-
-    @property
-    def gravity(self) -> FloatArray:
-        """(3,) [m/s^2], where the scene needs it."""
-        return GRAVITY if "gravity" in self.needs else np.zeros(3)
 
     def certified(self) -> Equilibrium | None:
         """A drape, found without any projection; None with exact limits.
@@ -142,7 +138,7 @@ class Drape(Scenario):
         """
         if self.directions == "exact":
             return None
-        found, reason = equilibrium(self.cloth(), self.problem(), BarrierSettings(), self.gravity)
+        found, reason = equilibrium(self.cloth(), self.problem(), BarrierSettings())
         if reason:
             raise ArithmeticError(f"no certified drape: {reason}")
         return found
@@ -153,9 +149,7 @@ class Drape(Scenario):
         """Ever better approximations of a drape, from `drape` or from the folds."""
         start = self.sheet()[2] if drape is None else drape.positions
         forces = None if drape is None else drape.limit_forces
-        return constrained_minimum(
-            self.cloth(), start, project, StaticsSettings(), self.gravity, forces
-        )
+        return constrained_minimum(self.cloth(), start, project, StaticsSettings(), forces)
 
     def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
         """Iterations at the drape, or towards one; see the base class."""
@@ -166,9 +160,9 @@ class Drape(Scenario):
                 time=float("nan"),
                 newton_iterations=1,
                 kinetic_energy=0.0,
-                gravity_energy=state.gravity,
-                membrane_energy=state.membrane,
-                bending_energy=state.bending,
+                gravity_energy=state.energies["gravity"],
+                membrane_energy=state.energies["membrane"],
+                bending_energy=state.energies["bending"],
                 equilibrium_residual=state.residual,
                 equilibrium_distance=float(np.linalg.norm(apart, axis=1).max()),
             )

@@ -4,6 +4,9 @@ What is imported from here stays here, wherever the modules behind it lie.
 """
 
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.physics.cloth import Cloth
+from strainbench.physics.energies.energy import Energy
+from strainbench.physics.pattern import Blocks
 from strainbench.problem.grid import square_grid
 from strainbench.problem.limits import StretchLimits
 from strainbench.problem.problem import Problem
@@ -16,9 +19,12 @@ from strainbench.solver.solver import Clock, Solution, Solver
 
 __version__ = "0.1.0"
 __all__ = [
+    "Blocks",
     "Certificate",
     "Clock",
+    "Cloth",
     "ClothScenario",
+    "Energy",
     "FloatArray",
     "IntArray",
     "Memory",

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from strainbench import Problem, StretchLimits
+from strainbench.physics.linear import symmetric
 from strainbench.problem.grid import square_grid
 from strainbench.referee.reference import verify
 
@@ -24,6 +25,11 @@ def quality(rest, elements):
     longest = np.max([np.sum((p - q) ** 2, axis=1) for p, q in ((a, b), (b, c), (c, a))], axis=0)
     u, v = b - a, c - a
     return np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / longest
+
+
+def hessian(body, x, diagonal):
+    """A body's clamped one, as a whole symmetric matrix on the free vertices."""
+    return symmetric(body.pattern.matrix(body.hessian_values(x, diagonal)))
 
 
 def random_mesh(rng, vertices=None):

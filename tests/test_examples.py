@@ -39,6 +39,10 @@ def test_an_added_scene_hangs_as_long_as_its_limit():
     assert result("add_a_scene") == pytest.approx(1.1, rel=1e-6)
 
 
+def test_a_sheet_on_an_added_energy_sinks_in_as_deep_as_its_weight_asks():
+    assert result("add_an_energy") == pytest.approx(9.81 / 10**2, rel=1e-5)
+
+
 def test_the_gap_of_an_own_answer_is_what_it_moves_in_vain():
     whole, along = result("certify_your_own")
     in_vain, needed = 1 - 1.01 / 1.2, 1.2 - 1.01
@@ -84,5 +88,5 @@ def test_an_example_is_short_and_stays_on_public_ground(path):
     assert set(ours) <= {"strainbench", "strainbench.export"}
 
 
-def test_there_are_six():
-    assert len(EXAMPLES) == 6
+def test_there_are_seven():
+    assert len(EXAMPLES) == 7

@@ -1,20 +1,19 @@
-"""A sheet of cloth: lumped masses, elastic energies and their sparse Hessian."""
+"""A sheet of cloth: its lumped masses and its energies."""
 
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-import scipy.sparse as sp
 
 from strainbench.arrays import FloatArray, IntArray
-from strainbench.physics.energies.bending import add_bending_gradient, add_bending_hessian, hinges
-from strainbench.physics.energies.contact import Contact, add_blocks
-from strainbench.physics.energies.membrane import add_membrane_gradient, add_membrane_hessian
-from strainbench.physics.linear import LinearSolver, best_linear_solver, symmetric
-from strainbench.physics.pattern import Pattern
+from strainbench.physics.body import GRAVITY, Body
+from strainbench.physics.energies.bending import Bending, hinges
+from strainbench.physics.energies.contact import Contact
+from strainbench.physics.energies.energy import Energy
+from strainbench.physics.energies.membrane import Membrane
 from strainbench.problem.elements import shape_gradients
 
 
@@ -41,8 +40,8 @@ class Material:
 
 
 @dataclass(frozen=True, eq=False)
-class Cloth:
-    """Membrane and hinge energies on a triangle mesh.
+class Cloth(Body):
+    """Membrane, hinges, contact and more on a triangle mesh.
 
     Parameters
     ----------
@@ -51,6 +50,8 @@ class Cloth:
     material : Material
     pinned : (p,) vertices that are not unknowns of a step
     contact : what the vertices are kept off, or None
+    gravity : (3,) [m/s^2]
+    more : further energies
     """
 
     rest: FloatArray
@@ -58,6 +59,8 @@ class Cloth:
     material: Material
     pinned: IntArray
     contact: Contact | None = None
+    gravity: FloatArray = field(default_factory=lambda: GRAVITY)
+    more: tuple[Energy, ...] = ()
 
     @cached_property
     def _shape(self) -> tuple[FloatArray, FloatArray]:
@@ -77,60 +80,13 @@ class Cloth:
         return mass
 
     @cached_property
-    def _hinges(self) -> tuple[IntArray, FloatArray]:
-        if self.material.bending == 0:
-            return np.empty((0, 4), dtype=np.int64), np.empty(0)
-        quads, weights = hinges(self.rest, self.elements, self._shape[1])
-        return quads, self.material.bending * weights
-
-    def energies(self, x: FloatArray) -> tuple[float, float, FloatArray]:
-        """Membrane and bending energy [J], and the gradient (n, 3) of their sum [N]."""
-        gradient = np.zeros_like(x)
-        lam, mu = self.material.lame
-        weights = self.material.thickness * self._shape[1]
-        membrane = add_membrane_gradient(
-            x, self.elements, self._shape[0], weights, lam, mu, gradient
-        )
-        bending = add_bending_gradient(x, *self._hinges, gradient)
-        return membrane, bending, gradient
-
-    def add_contact_gradient(self, x: FloatArray, out: FloatArray) -> float:
-        """Add the gradient (n, 3) [N] of contact to `out`; return its energy [J]."""
-        if self.contact is None:
-            return 0.0
-        return self.contact.add_gradient(x, self.contact.stiffnesses(self.mass), out)
-
-    @cached_property
-    def pattern(self) -> Pattern:
-        """Sparsity of the Hessian on the free vertices, found once."""
-        return Pattern.of([self.elements, self._hinges[0]], self.vertices, self.pinned)
-
-    @cached_property
-    def linear_solver(self) -> LinearSolver:
-        """For systems in the Hessian; analysed once."""
-        return best_linear_solver(self.pattern.matrix())
-
-    def hessian_values(self, x: FloatArray, diagonal: FloatArray, clamp: bool = True) -> FloatArray:
-        """Hessian plus a (n,) `diagonal` [N/m], as values of the pattern.
-
-        Positive semidefinite if `clamp`; that of bending always is.
-        """
-        lam, mu = self.material.lame
-        pattern = self.pattern
-        data = np.zeros(len(pattern.indices))
-        pattern.add_diagonal(data, diagonal)
-        weights = self.material.thickness * self._shape[1]
-        triangles, quads = pattern.slots
-        gradients, stride = self._shape[0], pattern.stride
-        add_membrane_hessian(
-            x, self.elements, gradients, weights, lam, mu, clamp, triangles, stride, data
-        )
-        add_bending_hessian(x, *self._hinges, quads, stride, data)
-        if self.contact is not None:
-            blocks = self.contact.hessian_blocks(x, self.contact.stiffnesses(self.mass))
-            add_blocks(blocks, pattern.free, pattern.diagonal, stride, data)
-        return data
-
-    def hessian(self, x: FloatArray, diagonal: FloatArray) -> sp.csc_array:
-        """The clamped one, as a whole symmetric matrix on the free vertices."""
-        return symmetric(self.pattern.matrix(self.hessian_values(x, diagonal)))
+    def energies(self) -> tuple[Energy, ...]:
+        """Membrane, bending, contact if there is any, and what was given."""
+        material, (gradients, areas) = self.material, self._shape
+        weights = material.thickness * areas
+        membrane = Membrane(self.elements, gradients, weights, material.lame)
+        hinged = self.elements if material.bending else self.elements[:0]
+        quads, shares = hinges(self.rest, hinged, areas)
+        bending = Bending(quads, material.bending * shares)
+        contact = (self.contact.penalty(self.mass),) if self.contact else ()
+        return (membrane, bending, *contact, *self.more)

@@ -1,6 +1,6 @@
 """Static equilibrium within limits, by a barrier method on the energy itself.
 
-minimise E(x) = membrane + bending + gravity  subject to  q_i(x) = (b_i^2 - |y_i|^2) / 2 >= 0,
+minimise E(x) = W(x) + gravity  subject to  q_i(x) = (b_i^2 - |y_i|^2) / 2 >= 0,
 
 y = G x, with the pins fixed: a primal-dual barrier method (Nocedal and Wright 2006, section 19.6)
 without slacks, as the start is within the limits and the limits are convex. With multipliers l_i,
@@ -24,19 +24,20 @@ such as 2 for 2 or 3 for 3; at 3 to 6, 10, 15, 30 and 60 for 2 it does not. The 
 projection, so it tells how far a drape found by projections is from a true one.
 """
 
+# ruff: noqa: E741 - l are multipliers
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from strainbench.arrays import FloatArray, IntArray
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
+from strainbench.physics.body import GRAVITY
 from strainbench.physics.cloth import Cloth
-from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.linear import NotPositiveDefiniteError
-from strainbench.physics.pattern import scatter
-from strainbench.physics.statics import Equilibrium, potential
+from strainbench.physics.pattern import Blocks, scatter
+from strainbench.physics.statics import Equilibrium
 from strainbench.problem.kinds import Sampled
 from strainbench.problem.problem import Problem
 
@@ -65,14 +66,7 @@ class BarrierSettings:
 
 @compiled
 def add_limits_hessian(
-    coefficients: FloatArray,
-    y: FloatArray,
-    l: FloatArray,  # noqa: E741
-    w: FloatArray,
-    elements: IntArray,
-    slots: IntArray,
-    stride: IntArray,
-    data: FloatArray,
+    coefficients: FloatArray, y: FloatArray, l: FloatArray, w: FloatArray, blocks: Blocks
 ) -> None:
     """Add sum_i l_i (g_i g_i^T) (x) I3 + w_i (g_i (x) y_i)(g_i (x) y_i)^T to a sparse matrix.
 
@@ -81,52 +75,53 @@ def add_limits_hessian(
     coefficients : (rows, 3) entries of G, as many rows an element as there are directions
     y : (rows, 3)
     l, w : (rows,)
-    slots, stride, data : of the `Pattern`'s triangles
+    blocks : of the triangles
     """
     values, modes = np.empty(4), np.zeros((4, 9))
-    directions = len(coefficients) // len(elements)
+    directions = len(coefficients) // len(blocks.elements)
     for i in range(len(coefficients)):
         values[:3], values[3] = l[i], w[i]
         for k in range(3):
             for c in range(3):
                 modes[c, 3 * k + c] = coefficients[i, k]
                 modes[3, 3 * k + c] = coefficients[i, k] * y[i, c]
-        e = i // directions
-        scatter(values, modes, elements[e], slots[e], stride, data)
+        scatter(values, modes, blocks, i // directions)
 
 
 class _Point:
     """Positions x (n, 3), and what phi and its derivatives need there."""
 
-    def __init__(self, cloth: Cloth, problem: Problem, gravity: FloatArray, x: FloatArray) -> None:
-        self.cloth, self.problem, self.gravity, self.x = cloth, problem, gravity, x
+    def __init__(self, cloth: Cloth, problem: Problem, x: FloatArray) -> None:
+        self.cloth, self.problem, self.x = cloth, problem, x
         self.y = problem.G @ x
         self.q = 0.5 * (problem.bounds**2 - np.sum(self.y**2, axis=1))
-        self.membrane, self.bending, self.height, self.gradient = potential(cloth, x, gravity)
+        self.energies, self.gradient = cloth.potential(x)
 
     def moved(self, dx: FloatArray) -> _Point:
         """The point at x + dx."""
-        return _Point(self.cloth, self.problem, self.gravity, self.x + dx)
+        return _Point(self.cloth, self.problem, self.x + dx)
 
     def phi(self, mu: float) -> float:
         """The barrier function [J]; infinite beyond the limits."""
         if self.q.min() <= 0:
             return float("inf")
-        energy = self.membrane + self.bending + self.height
-        return energy - mu * float(np.log(self.q).sum())
+        return sum(self.energies.values()) - mu * float(np.log(self.q).sum())
 
-    def with_forces(self, l: FloatArray) -> FloatArray:  # noqa: E741
+    def with_forces(self, l: FloatArray) -> FloatArray:
         """grad E + G^T (l y) at the free vertices (f, 3) [N]; grad phi where l = mu / q."""
         forces = self.problem.G.T @ (l[:, None] * self.y)
         gradient: FloatArray = (self.gradient + forces)[self.cloth.pattern.free]
         return gradient
 
+    def equilibrium(self, l: FloatArray, residual: float) -> Equilibrium:
+        """What is known of an equilibrium here."""
+        forces = self.problem.G.T @ (l[:, None] * self.y)
+        forces[self.cloth.pinned] = 0.0
+        return Equilibrium(self.x, forces, residual, self.energies)
+
 
 def equilibrium(
-    cloth: Cloth,
-    problem: Problem,
-    settings: BarrierSettings,
-    gravity: FloatArray = GRAVITY,
+    cloth: Cloth, problem: Problem, settings: BarrierSettings
 ) -> tuple[Equilibrium, str]:
     """A minimum of the potential within the limits of `problem`, from its target.
 
@@ -140,16 +135,15 @@ def equilibrium(
     ValueError
         If the target is not strictly within its limits, or these are not sampled.
     """
-    at = _Point(cloth, problem, gravity, problem.target)
+    at = _Point(cloth, problem, problem.target)
     if not isinstance(problem.kind, Sampled) or at.q.min() <= 0:
         raise ValueError("target: positions strictly within sampled limits are valid")
-    weight = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[cloth.pattern.free]))
     fall = np.linalg.norm(GRAVITY) * cloth.mass.sum() * np.ptp(problem.target, axis=0).max()
     count, share, reason = len(at.q), 1.0, f"{settings.max_iterations} iterations"
     mu, c = share * fall / count, 0.0
-    l = mu / at.q  # noqa: E741
+    l = mu / at.q
     for _ in range(settings.max_iterations):
-        residual = float(np.linalg.norm(at.with_forces(l))) / weight  # 1
+        residual = float(np.linalg.norm(at.with_forces(l))) / cloth.force_scale  # 1
         centred = bool(np.all(np.abs(l * at.q - mu) < mu))
         if share <= settings.tolerance and residual <= settings.tolerance and centred:
             reason = ""
@@ -165,33 +159,22 @@ def equilibrium(
             break
         c = max(4 * c, settings.damping) if halvings else c / 4
         c = c if c >= settings.damping else 0.0
-        dl = mu / at.q - l + l / at.q * np.sum(at.y * dy, axis=1)  # 6
-        falling = dl < 0
-        longest = float(np.min(-l[falling] / dl[falling], initial=np.inf))
-        at, l = found, l + min(1.0, settings.nearest * longest) * dl  # noqa: E741
-        l = np.clip(l, mu / at.q / settings.apart, mu / at.q * settings.apart)  # noqa: E741
-    forces = problem.G.T @ (l[:, None] * at.y)
-    forces[cloth.pinned] = 0.0
-    state = Equilibrium(at.x, forces, residual, at.membrane, at.bending, at.height)
-    return state, f"{reason}, residual {residual:.1e}" if reason else ""
+        l = _multipliers(at, l, dy, mu, settings)  # 6
+        at, near = found, mu / found.q
+        l = np.clip(l, near / settings.apart, near * settings.apart)
+    return at.equilibrium(l, residual), f"{reason}, residual {residual:.1e}" if reason else ""
 
 
 def _direction(
-    at: _Point,
-    l: FloatArray,  # noqa: E741
-    mu: float,
-    c: float,
-    settings: BarrierSettings,
+    at: _Point, l: FloatArray, mu: float, c: float, settings: BarrierSettings
 ) -> FloatArray:
     """The Newton step dx (n, 3) [m], 0 at the pins."""
     cloth, pattern, linear = at.cloth, at.cloth.pattern, at.cloth.linear_solver
-    coefficients, triangles = at.problem.row_coefficients, pattern.slots[0]
     least = max(c, settings.damping)
     for clamp, mass in ((False, c), *((clamp, f * least) for clamp, f in settings.dampings)):
         data = cloth.hessian_values(at.x, mass * cloth.mass, clamp)
-        add_limits_hessian(
-            coefficients, at.y, l, l / at.q, cloth.elements, triangles, pattern.stride, data
-        )
+        triangles = pattern.blocks(data)[0]
+        add_limits_hessian(at.problem.row_coefficients, at.y, l, l / at.q, triangles)
         try:
             linear.factorise(data)
             break
@@ -202,6 +185,17 @@ def _direction(
     dx = np.zeros_like(at.x)
     dx[pattern.free] = linear.solve(-at.with_forces(mu / at.q).ravel()).reshape(-1, 3)
     return dx
+
+
+def _multipliers(
+    at: _Point, l: FloatArray, dy: FloatArray, mu: float, settings: BarrierSettings
+) -> FloatArray:
+    """The multipliers after their own Newton step, on which none loses more than 9/10."""
+    dl = mu / at.q - l + l / at.q * np.sum(at.y * dy, axis=1)
+    falling = dl < 0
+    longest = float(np.min(-l[falling] / dl[falling], initial=np.inf))
+    moved: FloatArray = l + min(1.0, settings.nearest * longest) * dl
+    return moved
 
 
 def _line_search(

@@ -1,6 +1,7 @@
 """Implicit Euler as a minimisation, by Newton's method.
 
 One step minimises phi(x) = 1/2 ||x - x~||_M^2 / h^2 + W(x) with x~ = x^n + h v^n + h^2 g, from x^n.
+Gravity g is added here, and only here.
 
 1. gradient g; stop when ||g_free|| <= tolerance g_0 ||m||_2, with g_0 = 9.81 m/s^2
 2. Hessian H + M / h^2, factorised (numerically alone: `linear.py`); where that is not positive
@@ -15,17 +16,17 @@ One step minimises phi(x) = 1/2 ||x - x~||_M^2 / h^2 + W(x) with x~ = x^n + h v^
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
 from strainbench.arrays import FloatArray
-from strainbench.physics.cloth import Cloth
+from strainbench.physics.body import Body
 from strainbench.physics.linear import LinearSolver, NotPositiveDefiniteError
-
-GRAVITY = np.array([0.0, -9.81, 0.0])
-"""[m/s^2], y is up."""
 
 
 @dataclass(frozen=True)
@@ -54,138 +55,125 @@ class NewtonReport:
     evaluations: int  # of energy and gradient
 
 
-class _Clock:
-    """Adds up the time between readings under names."""
-
-    def __init__(self) -> None:
-        self.last = perf_counter()
-        self.spent = {"assembly": 0.0, "factorisation": 0.0, "line_search": 0.0}
-
-    def skip(self) -> None:
-        self.last = perf_counter()
-
-    def count(self, name: str) -> None:
-        now = perf_counter()
-        self.spent[name] += now - self.last
-        self.last = now
+class _NotConvergedError(ArithmeticError):
+    """Why the iteration ends here."""
 
 
-class _Function:
-    """phi, as a function of the free vertices."""
+class _Iterate(NamedTuple):
+    """Positions x (n, 3), phi there [J], and its gradient at the free vertices (f, 3) [N]."""
 
-    def __init__(self, cloth: Cloth, inertial: FloatArray, step: float) -> None:
-        self.cloth, self.inertial = cloth, inertial
-        self.inertia = cloth.mass / step**2
-        self.evaluations = 0
+    x: FloatArray
+    value: float
+    gradient: FloatArray
 
-    def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
-        """phi [J] and its gradient at the free vertices (f, 3) [N]."""
+
+class _Minimisation:
+    """phi, as a function of the free vertices, and what it has cost so far."""
+
+    def __init__(
+        self, body: Body, inertial: FloatArray, step: float, linear: LinearSolver | None
+    ) -> None:
+        self.body, self.linear = body, linear or body.linear_solver
+        self.inertial = inertial + step**2 * body.gravity
+        self.inertia = body.mass / step**2
+        self.evaluations = self.factorisations = 0
+        self.seconds = dict.fromkeys(("assembly", "factorisation", "line_search"), 0.0)
+
+    @contextmanager
+    def timed(self, part: str) -> Iterator[None]:
+        """Count the time within."""
+        begin = perf_counter()
+        try:
+            yield
+        finally:
+            self.seconds[part] += perf_counter() - begin
+
+    def at(self, x: FloatArray) -> _Iterate:
+        """The iterate with these positions."""
         self.evaluations += 1
-        membrane, bending, gradient = self.cloth.energies(x)
-        contact = self.cloth.add_contact_gradient(x, gradient)
+        values, gradient = self.body.gradient(x)
         difference = x - self.inertial
         force = self.inertia[:, None] * difference
         kinetic = 0.5 * float(np.vdot(force, difference))
-        return kinetic + membrane + bending + contact, (gradient + force)[self.cloth.pattern.free]
+        free = self.body.pattern.free
+        return _Iterate(x, sum(values.values(), kinetic), (gradient + force)[free])
+
+    def after(self, at: _Iterate, settings: NewtonSettings) -> _Iterate:
+        """The next iterate."""
+        if not (np.isfinite(at.value) and np.all(np.isfinite(at.gradient))):
+            raise _NotConvergedError("the energy or its gradient is not finite")
+        try:
+            self.factorise(at, clamp=False)
+        except NotPositiveDefiniteError:
+            self.factorise(at, clamp=True)
+        with self.timed("factorisation"):
+            d = self.linear.solve(-at.gradient.ravel()).reshape(-1, 3)  # 3
+        with self.timed("line_search"):
+            return self.line_search(at, d, settings)
+
+    def factorise(self, at: _Iterate, clamp: bool) -> None:
+        """The Hessian at an iterate."""  # 2
+        with self.timed("assembly"):
+            values = self.body.hessian_values(at.x, self.inertia, clamp)
+        self.factorisations += 1
+        with self.timed("factorisation"):
+            self.linear.factorise(values)
+
+    def line_search(self, at: _Iterate, d: FloatArray, settings: NewtonSettings) -> _Iterate:
+        """The first acceptable iterate on x + a d, a = 1, 1/2, ..."""  # 4
+        slope, free, delta = np.vdot(at.gradient, d), self.body.pattern.free, settings.armijo
+        for halvings in range(settings.max_halvings if slope < 0 else 0):
+            a = 0.5**halvings
+            x = at.x.copy()
+            x[free] += a * d
+            trial = self.at(x)
+            fell = trial.value <= at.value + delta * a * slope
+            same = trial.value <= at.value + settings.rounding * abs(at.value)
+            if fell or (same and np.vdot(trial.gradient, d) <= (2 * delta - 1) * slope):
+                return trial
+        raise _NotConvergedError("the line search found no lower energy")
 
 
 def minimise_step(
-    cloth: Cloth,
+    body: Body,
     start: FloatArray,
     inertial: FloatArray,
     step: float,
     settings: NewtonSettings,
     linear_solver: LinearSolver | None = None,
 ) -> tuple[FloatArray, NewtonReport]:
-    """Minimise 1/2 ||x - inertial||_M^2 / step^2 + W(x) over the free vertices.
+    """Minimise 1/2 ||x - inertial||_M^2 / step^2 + W(x) + gravity over the free vertices.
 
     Parameters
     ----------
     start : (n, 3) first iterate [m]; its pinned vertices stay where they are
-    inertial : (n, 3) where the cloth would go without elasticity [m]
+    inertial : (n, 3) where the body would go without elasticity and gravity [m]
     step : [s]
-    linear_solver : for the cloth's pattern; the cloth's own by default
+    linear_solver : for the body's pattern; the body's own by default
 
     Returns
     -------
     positions : (n, 3) [m], the last iterate, converged or not
     report : NewtonReport
     """
-    linear = linear_solver or cloth.linear_solver
-    free = cloth.pattern.free
-    scale = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[free]))
-    phi = _Function(cloth, inertial, step)
-    clock = _Clock()
-    factorisations = 0
-    x = start.copy()
-    value, gradient = phi(x)
-    clock.count("line_search")
-
-    def report(iterations: int, reason: str = "") -> NewtonReport:
-        residual = float(np.linalg.norm(gradient)) / scale
-        spent = {f"{name}_seconds": seconds for name, seconds in clock.spent.items()}
-        return NewtonReport(
-            converged=not reason,
-            iterations=iterations,
-            residual=residual,
-            reason=reason,
-            factorisations=factorisations,
-            evaluations=phi.evaluations,
-            **spent,
-        )
-
-    for iteration in range(settings.max_iterations + 1):
-        if np.linalg.norm(gradient) <= settings.tolerance * scale:  # 1
-            return x, report(iteration)
-        if not (np.isfinite(value) and np.all(np.isfinite(gradient))):
-            return x, report(iteration, "the energy or its gradient is not finite")
-        if iteration == settings.max_iterations:
-            break
-        clock.skip()
-        for clamp in (False, True):  # 2
-            values = cloth.hessian_values(x, phi.inertia, clamp)
-            clock.count("assembly")
-            factorisations += 1
-            try:
-                linear.factorise(values)
-                break
-            except NotPositiveDefiniteError as error:
-                reason = str(error)
-            finally:
-                clock.count("factorisation")
-        else:
-            return x, report(iteration, reason)
-        d = linear.solve(-gradient.ravel()).reshape(-1, 3)  # 3
-        clock.count("factorisation")
-        found = _line_search(phi, x, value, gradient, d, settings)  # 4
-        clock.count("line_search")
-        if found is None:
-            return x, report(iteration, "the line search found no lower energy")
-        x, value, gradient = found
-    return x, report(iteration, f"{settings.max_iterations} iterations")
-
-
-def _line_search(
-    phi: _Function,
-    x: FloatArray,
-    value: float,
-    gradient: FloatArray,
-    d: FloatArray,
-    settings: NewtonSettings,
-) -> tuple[FloatArray, float, FloatArray] | None:
-    """The first acceptable trial on x + a d, a = 1, 1/2, ...: positions, phi, gradient."""
-    slope = float(np.vdot(gradient, d))
-    if not slope < 0:
-        return None
-    free, delta = phi.cloth.pattern.free, settings.armijo
-    a = 1.0
-    for _ in range(settings.max_halvings):
-        trial = x.copy()
-        trial[free] += a * d
-        trial_value, trial_gradient = phi(trial)
-        fell = trial_value <= value + delta * a * slope
-        same = trial_value <= value + settings.rounding * abs(value)
-        if fell or (same and float(np.vdot(trial_gradient, d)) <= (2 * delta - 1) * slope):
-            return trial, trial_value, trial_gradient
-        a *= 0.5
-    return None
+    phi = _Minimisation(body, inertial, step, linear_solver)
+    with phi.timed("line_search"):
+        at = phi.at(start.copy())
+    iterations, reason = 0, ""
+    while not (reason or np.linalg.norm(at.gradient) <= settings.tolerance * body.force_scale):  # 1
+        try:
+            if iterations == settings.max_iterations:
+                raise _NotConvergedError(f"{iterations} iterations")
+            at = phi.after(at, settings)
+            iterations += 1
+        except (NotPositiveDefiniteError, _NotConvergedError) as error:
+            reason = str(error)
+    return at.x, NewtonReport(
+        converged=not reason,
+        iterations=iterations,
+        residual=float(np.linalg.norm(at.gradient)) / body.force_scale,
+        reason=reason,
+        factorisations=phi.factorisations,
+        evaluations=phi.evaluations,
+        **{f"{part}_seconds": seconds for part, seconds in phi.seconds.items()},
+    )

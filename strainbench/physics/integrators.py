@@ -3,7 +3,7 @@
 A scheme is a function of the motion so far, the step size dt, a minimisation that takes a step of
 implicit Euler or BDF-2, and a projection. Without limits the projection changes nothing, and SAP
 is implicit Euler itself. h is the size of a sub-step: dt for projection schemes, dt/2 for
-reflection schemes. x~ is where the cloth would go without elasticity (`minimise_step`).
+reflection schemes. x~ is where the cloth would go without forces (`minimise_step`).
 """
 
 from __future__ import annotations
@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from functools import partial
 
 from strainbench.arrays import FloatArray
-from strainbench.physics.implicit_euler import GRAVITY
 
 Minimise = Callable[[FloatArray, FloatArray, float, float], FloatArray]
-"""(start, inertial, step, time) to the minimum of 1/2 ||x - inertial||_M^2 / step^2 + W(x),
-with the pins where they are at that time."""
+"""(start, inertial, step, time) to the minimum of 1/2 ||x - inertial||_M^2 / step^2 + W(x) and
+gravity, with the pins where they are at that time."""
 Project = Callable[[FloatArray], FloatArray]
 """Candidate positions to limited ones."""
 Scheme = Callable[["Motion", float, Minimise, Project], "Motion"]
@@ -44,8 +43,8 @@ class Motion:
 def implicit_euler(
     x: FloatArray, v: FloatArray, h: float, time: float, minimise: Minimise
 ) -> FloatArray:
-    """Candidate at `time`, after h: x~ = x + h v + h^2 g."""
-    return minimise(x, x + h * v + h**2 * GRAVITY, h, time)
+    """Candidate at `time`, after h: x~ = x + h v."""
+    return minimise(x, x + h * v, h, time)
 
 
 def bdf2(
@@ -58,10 +57,10 @@ def bdf2(
 ) -> FloatArray:
     """Candidate at `time`, after h; x', v' are a sub-step back.
 
-    x~ = (4 x - x')/3 + 8/9 h v - 2/9 h v' + 4/9 h^2 g, with step 2/3 h.
+    x~ = (4 x - x')/3 + 8/9 h v - 2/9 h v', with step 2/3 h.
     """
     x0, v0 = before
-    inertial = (4 * x - x0) / 3 + h * (8 * v - 2 * v0) / 9 + 4 / 9 * h**2 * GRAVITY
+    inertial = (4 * x - x0) / 3 + h * (8 * v - 2 * v0) / 9
     return minimise(x, inertial, 2 * h / 3, time)
 
 

@@ -7,6 +7,7 @@ and repeat the lower ones.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,49 +30,42 @@ class Pattern:
     stride: IntArray  # (n,) entries in each column of vertex j
     diagonal: IntArray  # (free,) slot of each diagonal block
     free: IntArray
+    families: list[IntArray]  # (e, k) each
 
     @classmethod
     def of(cls, families: list[IntArray], n: int, pinned: IntArray) -> Pattern:
         """The pattern in which the vertices of each element of each family interact."""
         free = np.setdiff1d(np.arange(n), pinned)
+        size = len(free)
         number = np.full(n, -1)
-        number[free] = np.arange(len(free))
-        rows = np.concatenate([np.repeat(f, f.shape[1], axis=1).ravel() for f in families])
-        columns = np.concatenate([np.tile(f, (1, f.shape[1])).ravel() for f in families])
-        keep = (number[rows] >= number[columns]) & (number[columns] >= 0)
-        blocks = sp.csc_array(
-            (np.ones(keep.sum()), (number[rows[keep]], number[columns[keep]])),
-            shape=2 * (len(free),),
-        )
-        blocks.sum_duplicates()
-        blocks.sort_indices()
-        degree = np.diff(blocks.indptr)
-        columns_of = np.repeat(np.arange(len(free)), degree)
-        place = np.arange(blocks.nnz) - blocks.indptr[columns_of]
-        first = 9 * blocks.indptr[columns_of] + 3 * place
-        lookup = sp.csc_array((first + 1, blocks.indices, blocks.indptr), shape=blocks.shape)
-        slots = []
-        for family in families:
-            k = family.shape[1]
-            if len(family) == 0:  # such as no hinges
-                slots.append(np.empty((0, k, k), dtype=np.int64))
-                continue
-            i = number[np.repeat(family, k, axis=1)].ravel()
-            j = number[np.tile(family, (1, k))].ravel()
-            inside = (i >= j) & (j >= 0)
-            slot = np.full(len(i), -1)
-            slot[inside] = np.asarray(lookup[i[inside], j[inside]]).ravel() - 1
-            slots.append(slot.reshape(-1, k, k))
+        number[free] = np.arange(size)
+        rows = np.concatenate([np.repeat(number[f], f.shape[1], axis=1).ravel() for f in families])
+        columns = np.concatenate([np.tile(number[f], (1, f.shape[1])).ravel() for f in families])
+        inside = (rows >= columns) & (columns >= 0)
+        keys, block = np.unique(columns[inside] * size + rows[inside], return_inverse=True)
+        column, row = np.divmod(keys, size)
+        degree = np.bincount(column, minlength=size)
+        before = np.cumsum(degree) - degree
+        first = 6 * before[column] + 3 * np.arange(len(keys))  # slot of each block
+        c, a = np.arange(3)[:, None, None], np.arange(3)[:, None]
+        indices = np.empty(9 * len(keys), dtype=np.int64)
+        indices[first + 3 * c * degree[column] + a] = 3 * row + a
+        indptr = np.concatenate([[0], np.cumsum(np.repeat(3 * degree, 3))])
+        slot, diagonal = np.full(len(rows), -1), np.full(size, -1)
+        slot[inside] = first[block]
+        diagonal[column[row == column]] = first[row == column]
+        parts = np.split(slot, np.cumsum([f.size * f.shape[1] for f in families]))
+        slots = [
+            part.reshape(*f.shape, f.shape[1]) for part, f in zip(parts, families, strict=False)
+        ]
         stride = np.zeros(n, dtype=np.int64)
         stride[free] = 3 * degree
-        indptr = np.concatenate([[0], np.cumsum(np.repeat(3 * degree, 3))])
-        column_indices = [
-            (3 * blocks.indices[a:b, None] + np.arange(3)).ravel()
-            for a, b in zip(blocks.indptr[:-1], blocks.indptr[1:], strict=True)
-        ]
-        indices = np.concatenate([np.tile(c, 3) for c in column_indices])
-        diagonal = np.asarray(lookup.diagonal()).ravel() - 1
-        return cls(3 * len(free), indptr, indices, slots, stride, diagonal, free)
+        return cls(3 * size, indptr, indices, slots, stride, diagonal, free, families)
+
+    def blocks(self, data: FloatArray) -> list[Blocks]:
+        """Where each family's blocks are added to the values `data`."""
+        families = zip(self.families, self.slots, strict=True)
+        return [Blocks(elements, slots, self.stride, data) for elements, slots in families]
 
     def add_diagonal(self, data: FloatArray, values: FloatArray) -> None:
         """Add the (n,) `values` to the diagonal of each free vertex's block."""
@@ -84,31 +78,37 @@ class Pattern:
         return sp.csc_array((data, self.indices, self.indptr), shape=2 * (self.size,))
 
 
-@compiled
-def scatter(
-    values: FloatArray,
-    modes: FloatArray,
-    vertices: IntArray,
-    slot: IntArray,
-    stride: IntArray,
-    data: FloatArray,
-) -> None:
-    """Add sum_m values_m q_m q_m^T of one element, q_m = modes[m], to the sparse matrix.
+class Blocks(NamedTuple):
+    """Where the Hessians of elements (e, k) are added: see `Pattern`; (nnz,) values `data`."""
 
-    Parameters
-    ----------
-    values : (r,)
-    modes : (r, 3k), three columns for each of the (k,) vertices
-    slot, stride, data : of the `Pattern`
-    """
+    elements: IntArray
+    slots: IntArray
+    stride: IntArray
+    data: FloatArray
+
+    def add(self, values: FloatArray, modes: FloatArray) -> None:
+        """Add sum_m values_m q_m q_m^T of each element: values (e, r), and modes q (e, r, 3k)."""
+        _scatter_each(np.ascontiguousarray(values), np.ascontiguousarray(modes), self)
+
+
+@compiled
+def scatter(values: FloatArray, modes: FloatArray, blocks: Blocks, e: int) -> None:
+    """Add sum_m values_m q_m q_m^T of element e: values (r,), and modes q (r, 3k)."""
+    vertices, slots, data = blocks.elements[e], blocks.slots[e], blocks.data
     for j in range(len(vertices)):
         for i in range(len(vertices)):
-            start = slot[i, j]
+            start = slots[i, j]
             if start < 0:
                 continue
             for m in range(len(values)):
                 for c in range(3):
-                    column = start + c * stride[vertices[j]]
+                    column = start + c * blocks.stride[vertices[j]]
                     factor = values[m] * modes[m, 3 * j + c]
                     for a in range(3):
                         data[column + a] += factor * modes[m, 3 * i + a]
+
+
+@compiled
+def _scatter_each(values: FloatArray, modes: FloatArray, blocks: Blocks) -> None:
+    for e in range(len(values)):
+        scatter(values[e], modes[e], blocks, e)

@@ -1,6 +1,6 @@
 """Static equilibrium under limits: the minimum of the energy, one projection a step.
 
-minimise E(x) = membrane + bending + gravity  subject to  x in C, the limits and the pins.
+minimise E(x) = W(x) + gravity  subject to  x in C, the limits and the pins.
 
 Repeating step-and-project does not find it: at its fixed point the step and the projection undo
 each other, which is no minimum of E. What is missing is a memory of what the projection pushed
@@ -31,8 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from strainbench.arrays import FloatArray
-from strainbench.physics.cloth import Cloth
-from strainbench.physics.implicit_euler import GRAVITY
+from strainbench.physics.body import Body
 
 
 @dataclass(frozen=True)
@@ -57,32 +56,20 @@ class Equilibrium:
     positions : (n, 3) [m], as the projection returned them
     limit_forces : (n, 3) [N], G^T Y of the limits: -grad E at a minimum
     residual : ||(grad E + G^T Y)_free|| / (g_0 ||m||_2), relative to the weight
-    membrane, bending, gravity : energies [J]; heights count from y = 0
+    energies : by name [J], gravity's among them
     """
 
     positions: FloatArray
     limit_forces: FloatArray
     residual: float
-    membrane: float
-    bending: float
-    gravity: float
-
-
-def potential(
-    cloth: Cloth, x: FloatArray, gravity: FloatArray = GRAVITY
-) -> tuple[float, float, float, FloatArray]:
-    """Membrane, bending and gravity energy [J], and the gradient (n, 3) of their sum [N]."""
-    membrane, bending, gradient = cloth.energies(x)
-    weight = cloth.mass[:, None] * gravity
-    return membrane, bending, -float(np.sum(weight * x)), gradient - weight
+    energies: dict[str, float]
 
 
 def constrained_minimum(
-    cloth: Cloth,
+    body: Body,
     start: FloatArray,
     project: Callable[[FloatArray], FloatArray],
     settings: StaticsSettings,
-    gravity: FloatArray = GRAVITY,
     limit_forces: FloatArray | None = None,
 ) -> Iterator[Equilibrium]:
     """Approach a minimum of the potential under limits, step by step.
@@ -90,27 +77,25 @@ def constrained_minimum(
     Parameters
     ----------
     start : (n, 3) within the limits [m]; its pinned vertices stay where they are
-    project : onto the limits, in the norm of the cloth's masses
-    gravity : (3,) [m/s^2]
+    project : onto the limits, in the norm of the body's masses
     limit_forces : (n, 3) at the start [N], or None for none
     """
-    free, M, h, r = cloth.pattern.free, cloth.mass[:, None], settings.step, settings.relaxation
-    weight = float(np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[free]))
+    free, M, h, r = body.pattern.free, body.mass[:, None], settings.step, settings.relaxation
     z = start.copy()
     u = np.zeros_like(start) if limit_forces is None else h**2 * limit_forces / M
-    gradient, linear = potential(cloth, z, gravity)[-1], cloth.linear_solver
+    gradient, linear = body.potential(z)[1], body.linear_solver
     count = 0
     while True:
-        linear.factorise(cloth.hessian_values(z, cloth.mass / h**2))
+        linear.factorise(body.hessian_values(z, body.mass / h**2))
         x = z.copy()  # 1
         x[free] -= linear.solve((gradient + M * u / h**2)[free].ravel()).reshape(-1, 3)
         before, relaxed = z, r * x + (1 - r) * z
         z = project(relaxed + u)  # 2
         u = relaxed + u - z  # 3
         forces = M * u / h**2
-        membrane, bending, height, gradient = potential(cloth, z, gravity)
-        residual = float(np.linalg.norm((gradient + forces)[free])) / weight
-        yield Equilibrium(z, forces, residual, membrane, bending, height)
+        energies, gradient = body.potential(z)
+        residual = float(np.linalg.norm((gradient + forces)[free])) / body.force_scale
+        yield Equilibrium(z, forces, residual, energies)
         count += 1
         if count % settings.balance_every == 0:  # 4
             apart = float(np.sum(M * (x - z) ** 2) ** 0.5)

@@ -11,14 +11,10 @@ from typing import ClassVar
 import numpy as np
 
 from strainbench.arrays import FloatArray
+from strainbench.physics.body import gravity_of
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.contact import Contact
-from strainbench.physics.implicit_euler import (
-    GRAVITY,
-    NewtonReport,
-    NewtonSettings,
-    minimise_step,
-)
+from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
 from strainbench.physics.integrators import INTEGRATORS, Motion
 from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import FEWEST_STEPS, SheetScenario, StepReport
@@ -98,7 +94,8 @@ class ClothScenario(SheetScenario):
     def cloth(self) -> Cloth:
         """The sheet's masses and energies."""
         rest, elements, _, pinned = self.sheet()
-        return Cloth(rest, elements, self.material(), pinned, self.contact())
+        gravity = gravity_of(self.needs)
+        return Cloth(rest, elements, self.material(), pinned, self.contact(), gravity)
 
     def mass(self) -> FloatArray:
         """(n,) [kg], lumped at the vertices."""
@@ -129,7 +126,6 @@ class _Step:
     def __init__(self, scene: ClothScenario, cloth: Cloth, velocities: FloatArray) -> None:
         self.scene, self.cloth, self.velocities = scene, cloth, velocities
         self.settings = NewtonSettings()
-        self.gravity = GRAVITY if "gravity" in scene.needs else np.zeros(3)
         self.seconds, self.pin_work = 0.0, 0.0
         self.newton: list[NewtonReport] = []
 
@@ -141,7 +137,6 @@ class _Step:
         pinned, first = self.cloth.pinned, start.copy()
         where = self.scene.pin_positions(time)
         first[pinned] = start[pinned] if where is None else where
-        inertial = inertial + step**2 * (self.gravity - GRAVITY)  # the schemes add it to all
         push = self.scene.force(start, self.velocities, time)
         if push is not None:
             inertial = inertial + step**2 * push / self.cloth.mass[:, None]
@@ -150,16 +145,14 @@ class _Step:
         self.newton.append(report)
         if where is not None:
             inertia = self.cloth.mass[:, None] * (found - inertial) / step**2
-            gradient = self.cloth.energies(found)[-1]
-            self.cloth.add_contact_gradient(found, gradient)
-            force = (gradient + inertia)[pinned]
+            force = (self.cloth.potential(found)[1] + inertia)[pinned]
             self.pin_work += float(np.sum(force * (found - start)[pinned]))
         return found
 
     def report(self, motion: Motion) -> StepReport:
         """The step's costs, and energy and momentum after it."""
         mass, v = self.cloth.mass[:, None], motion.velocities
-        membrane, bending, gradient = self.cloth.energies(motion.positions)
+        energies, _ = self.cloth.potential(motion.positions)
         contact = self.cloth.contact
         momentum = np.sum(mass * v, axis=0)
         return StepReport(
@@ -171,13 +164,13 @@ class _Step:
             factorisation_seconds=sum(r.factorisation_seconds for r in self.newton),
             line_search_seconds=sum(r.line_search_seconds for r in self.newton),
             kinetic_energy=0.5 * float(np.sum(mass * v**2)),
-            gravity_energy=-float(np.sum(mass * motion.positions @ self.gravity[:, None])),
-            membrane_energy=membrane,
-            bending_energy=bending,
+            gravity_energy=energies["gravity"],
+            membrane_energy=energies["membrane"],
+            bending_energy=energies["bending"],
             momentum_x=float(momentum[0]),
             momentum_y=float(momentum[1]),
             momentum_z=float(momentum[2]),
             pin_work=self.pin_work,
-            contact_energy=self.cloth.add_contact_gradient(motion.positions, gradient),
+            contact_energy=energies.get("contact", 0.0),
             penetration=contact.penetration(motion.positions) if contact else 0.0,
         )

@@ -27,10 +27,10 @@ from strainbench.bench.cell import Cell
 from strainbench.bench.machine import describe_machine
 from strainbench.bench.records import open_folder, remember_machine
 from strainbench.files import locked, write_whole
+from strainbench.physics.body import gravity_of
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.contact import Contact, Floor
-from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
-from strainbench.physics.statics import potential
+from strainbench.physics.implicit_euler import NewtonSettings, minimise_step
 from strainbench.referee.reference import reference_of
 from strainbench.render.film import Track, untracked
 from strainbench.scenario.cloth import ClothScenario
@@ -129,9 +129,9 @@ class Added:
     def __init__(self, scene: SheetScenario, part: str) -> None:
         rest, elements, self.before, pinned = scene.sheet()
         contact = FLOOR if part == "contact" else None
-        self.cloth = Cloth(rest, elements, Material().only({part}), pinned, contact)
+        material, gravity = Material().only({part}), gravity_of({part})
+        self.cloth = Cloth(rest, elements, material, pinned, contact, gravity)
         self.step: float = getattr(scene, "step", 1 / 60)
-        self.gravity = GRAVITY if part == "gravity" else np.zeros(3)
         self.inertia = float(part == "inertia")
         self.velocities = np.zeros_like(self.before)
         self.iterations, self.failures = 0, 0
@@ -139,7 +139,7 @@ class Added:
     def candidate(self, x: FloatArray) -> FloatArray:
         """Where the scene's candidate x (n, 3) goes in a step."""
         h = self.step
-        inertial = x + self.inertia * h * self.velocities + h**2 * self.gravity
+        inertial = x + self.inertia * h * self.velocities
         found, report = minimise_step(self.cloth, x, inertial, h, NewtonSettings())
         self.iterations += report.iterations
         self.failures += not report.converged
@@ -215,9 +215,7 @@ def energy(run: Run, base: Run, step: int) -> float | None:
     cloth, x = base.cloth, run.positions[step]
     if cloth is None:
         return None
-    gravity = GRAVITY if "gravity" in base.scene.needs else np.zeros(3)
-    contact = cloth.add_contact_gradient(x, np.zeros_like(x))
-    return run.kinetic[step] + sum(potential(cloth, x, gravity)[:3]) + contact
+    return run.kinetic[step] + sum(cloth.potential(x)[0].values())
 
 
 def empty(scene: Scenario, change: str) -> Row:

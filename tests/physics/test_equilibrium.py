@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from scenarios.drape import SAMPLES, Drape
+from strainbench.physics.body import GRAVITY
 from strainbench.physics.equilibrium import (
     BarrierSettings,
     add_limits_hessian,
     equilibrium,
     longest_step,
 )
-from strainbench.physics.implicit_euler import GRAVITY
 from strainbench.physics.linear import symmetric
-from strainbench.physics.statics import potential
 
 SETTINGS = BarrierSettings()
 
@@ -26,7 +25,7 @@ def hung(scene, settings=SETTINGS):
 
 
 def energy(scene, x):
-    return sum(potential(scene.cloth(), x)[:3])
+    return sum(scene.cloth().potential(x)[0].values())
 
 
 @pytest.fixture(params=SAMPLES)
@@ -39,7 +38,7 @@ def test_the_conditions_of_a_minimum_hold(scene):
     assert reason == ""
     cloth, problem = scene.cloth(), scene.problem()
     assert problem.violations(found.positions).max() == 0
-    left = (potential(cloth, found.positions)[-1] + found.limit_forces)[problem.free]
+    left = (cloth.potential(found.positions)[1] + found.limit_forces)[problem.free]
     weight = np.linalg.norm(GRAVITY) * np.linalg.norm(cloth.mass[problem.free])
     assert np.linalg.norm(left) / weight == pytest.approx(found.residual)
     assert found.residual <= SETTINGS.tolerance
@@ -114,16 +113,8 @@ def test_the_hessian_of_the_limits_is_that_of_the_barrier(rng):
     y = problem.G @ x
     q = 0.5 * (problem.bounds**2 - np.sum(y**2, axis=1))
     data = np.zeros(len(pattern.indices))
-    add_limits_hessian(
-        problem.row_coefficients,
-        y,
-        mu / q,
-        mu / q**2,
-        cloth.elements,
-        pattern.slots[0],
-        pattern.stride,
-        data,
-    )
+    triangles = pattern.blocks(data)[0]
+    add_limits_hessian(problem.row_coefficients, y, mu / q, mu / q**2, triangles)
     H = symmetric(pattern.matrix(data)).toarray()
     for _ in range(5):
         d = np.zeros_like(x)

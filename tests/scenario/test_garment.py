@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scenarios.garment import DATA, Garment, doubled_areas, skirt
 from strainbench.physics.cloth import Cloth
 from strainbench.scenario.meshfile import MeshFile, flattened, read_mesh, write_obj
+from tests.problems import hessian
 
 
 @pytest.fixture
@@ -128,7 +129,7 @@ def test_a_flattened_garment_is_unstrained(tmp_path, bumpy):
     F = problem.deformation_gradients(problem.target)
     squares = np.swapaxes(F, 1, 2) @ F
     np.testing.assert_allclose(squares, np.broadcast_to(np.eye(2), squares.shape), atol=1e-12)
-    assert scene.cloth().energies(problem.target)[0] < 1e-20
+    assert scene.cloth().gradient(problem.target)[0]["membrane"] < 1e-20
     np.testing.assert_allclose(doubled_areas(scene.pattern()), 2 * problem.measures, rtol=1e-12)
 
 
@@ -158,7 +159,8 @@ def test_the_skirt_is_its_pattern_sewn_along_a_seam():
 
 
 def test_the_seam_bends_as_any_edge():
-    quads, weights = Garment(resolution=4).cloth()._hinges
+    _, bending = Garment(resolution=4).cloth().energies
+    quads, weights = bending.elements, bending.weights
     assert len(quads) == (3 * 128 - 32) // 2  # every edge but those of waist and hem
     on_seam = np.all(quads[:, :2] < 5, axis=1)  # vertices 0 to 4 are the seam
     middle = np.all((quads[:, :2] >= 40) & (quads[:, :2] < 45), axis=1)
@@ -223,10 +225,11 @@ def test_rest_by_corner_is_the_same_cloth_where_nothing_is_sewn(rng):
         Cloth(r, elements, Garment().material(), np.array([0])) for r in (rest, rest[elements])
     )
     np.testing.assert_array_equal(one.mass, other.mass)
-    for a, b in zip(one.energies(x), other.energies(x), strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-13)
+    (values, gradient), (others, same) = one.gradient(x), other.gradient(x)
+    assert values == pytest.approx(others, rel=1e-13)
+    np.testing.assert_allclose(gradient, same, rtol=1e-13)
     ones = np.ones(5)
-    np.testing.assert_allclose(one.hessian(x, ones).data, other.hessian(x, ones).data, rtol=1e-12)
+    np.testing.assert_allclose(hessian(one, x, ones).data, hessian(other, x, ones).data, rtol=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -426,7 +429,7 @@ def test_a_sheet_with_two_sides_is_the_sheet(tmp_path, rng):
     assert [n for n in two.notes() if "16 of 32 faces that repeat the corners of others" in n]
     np.testing.assert_allclose(one.cloth().mass, two.cloth().mass)
     x = one.problem().target + 0.01 * rng.normal(size=one.problem().target.shape)
-    np.testing.assert_allclose(two.cloth().energies(x)[1], one.cloth().energies(x)[1])
+    np.testing.assert_allclose(*(c.cloth().gradient(x)[0]["bending"] for c in (two, one)))
 
 
 def test_sides_with_vertices_of_their_own_are_one_sheet_too(tmp_path):

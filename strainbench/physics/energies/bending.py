@@ -7,12 +7,32 @@ Gauss-Newton Hessian 2 c grad(theta) grad(theta)^T is used: positive semidefinit
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
-from strainbench.physics.pattern import scatter
+from strainbench.physics.energies.energy import Energy
+from strainbench.physics.pattern import Blocks, scatter
 from strainbench.problem.elements import rest_corners
+
+
+@dataclass(frozen=True, eq=False)
+class Bending(Energy):
+    """All hinges of a sheet."""
+
+    name = "bending"
+    elements: IntArray  # (h, 4), as of `hinges`
+    weights: FloatArray  # (h,) c [J]
+
+    def add_gradient(self, x: FloatArray, out: FloatArray) -> float:
+        """See the base class."""
+        return float(add_bending_gradient(x, self.elements, self.weights, out))
+
+    def add_hessian(self, x: FloatArray, blocks: Blocks, clamp: bool) -> None:  # noqa: ARG002
+        """See the base class; Gauss and Newton's needs no clamping."""
+        add_bending_hessian(x, self.weights, blocks)
 
 
 def hinges(rest: FloatArray, elements: IntArray, areas: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -91,19 +111,12 @@ def add_bending_gradient(
 
 
 @compiled
-def add_bending_hessian(
-    x: FloatArray,
-    quads: IntArray,
-    weights: FloatArray,
-    slots: IntArray,
-    stride: IntArray,
-    data: FloatArray,
-) -> None:
-    """Add every hinge's 2 c grad(theta) grad(theta)^T [N/m] to a sparse matrix."""
+def add_bending_hessian(x: FloatArray, weights: FloatArray, blocks: Blocks) -> None:
+    """Add every hinge's 2 c grad(theta) grad(theta)^T [N/m]."""
     grad = np.empty((4, 3))
     mode = grad.reshape(1, 12)
     value = np.empty(1)
-    for h in range(len(quads)):
-        angle_and_gradient(x, quads[h], grad)
+    for h in range(len(weights)):
+        angle_and_gradient(x, blocks.elements[h], grad)
         value[0] = 2 * weights[h]
-        scatter(value, mode, quads[h], slots[h], stride, data)
+        scatter(value, mode, blocks, h)

@@ -14,6 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.physics.energies.energy import Energy
+from strainbench.physics.pattern import Blocks
 
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -74,29 +76,10 @@ class Contact:
             if not 0 < value < float("inf"):
                 raise ValueError(f"{name} is {value}: a number above 0 is valid")
 
-    def stiffnesses(self, mass: FloatArray) -> FloatArray:
-        """(n,) k_i [N/m] of vertices of these masses (n,)."""
-        k: FloatArray = self.stiffness * mass / mass.mean()
-        return k
-
-    def add_gradient(self, x: FloatArray, k: FloatArray, out: FloatArray) -> float:
-        """Add the gradient (n, 3) [N] to `out`; return the energy [J]. `k` (n,) is [N/m]."""
-        energy = 0.0
-        for obstacle in self.obstacles:
-            d, normals = obstacle.distances(x)
-            depth = np.maximum(0.0, self.margin - d)
-            energy += 0.5 * float(np.sum(k * depth**2))
-            out -= (k * depth)[:, None] * normals
-        return energy
-
-    def hessian_blocks(self, x: FloatArray, k: FloatArray) -> FloatArray:
-        """(n, 3, 3) positive semidefinite diagonal blocks of the Hessian [N/m]; no others."""
-        blocks = np.zeros((len(x), 3, 3))
-        for obstacle in self.obstacles:
-            d, normals = obstacle.distances(x)
-            touching = np.where(d < self.margin, k, 0.0)
-            blocks += touching[:, None, None] * normals[:, :, None] * normals[:, None, :]
-        return blocks
+    def penalty(self, mass: FloatArray) -> Penalty:
+        """The energy of vertices of these masses (n,)."""
+        vertices = np.arange(len(mass))[:, None]
+        return Penalty(vertices, self.stiffness * mass / mass.mean(), self.margin, self.obstacles)
 
     def touches(self, x: FloatArray) -> bool:
         """Whether a vertex lies within the margin of an obstacle, or inside one."""
@@ -107,13 +90,29 @@ class Contact:
         return max(float(np.max(-o.distances(x)[0], initial=0.0)) for o in self.obstacles)
 
 
-def add_blocks(
-    blocks: FloatArray, free: IntArray, diagonal: IntArray, stride: IntArray, data: FloatArray
-) -> None:
-    """Add the blocks (n, 3, 3) of the free vertices to the values of a sparse matrix.
+@dataclass(frozen=True, eq=False)
+class Penalty(Energy):
+    """The energy of a `Contact`."""
 
-    `free`, `diagonal` and `stride` are those of the cloth's `Pattern`.
-    """
-    for c in range(3):
-        for a in range(3):
-            data[diagonal + c * stride[free] + a] += blocks[free, a, c]
+    name = "contact"
+    elements: IntArray  # (n, 1), the vertices
+    k: FloatArray  # (n,) [N/m]
+    margin: float
+    obstacles: tuple[Obstacle, ...]
+
+    def add_gradient(self, x: FloatArray, out: FloatArray) -> float:
+        """See the base class."""
+        energy = 0.0
+        for obstacle in self.obstacles:
+            d, normals = obstacle.distances(x)
+            depth = np.maximum(0.0, self.margin - d)
+            energy += 0.5 * float(np.sum(self.k * depth**2))
+            out -= (self.k * depth)[:, None] * normals
+        return energy
+
+    def add_hessian(self, x: FloatArray, blocks: Blocks, clamp: bool) -> None:  # noqa: ARG002
+        """See the base class; k n n^T always."""
+        for obstacle in self.obstacles:
+            d, normals = obstacle.distances(x)
+            touching = np.where(d < self.margin, self.k, 0.0)
+            blocks.add(touching[:, None], normals[:, None])

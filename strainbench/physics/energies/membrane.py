@@ -12,11 +12,34 @@ gives the nearest positive semidefinite matrix.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
-from strainbench.physics.pattern import scatter
+from strainbench.physics.energies.energy import Energy
+from strainbench.physics.pattern import Blocks, scatter
+
+
+@dataclass(frozen=True, eq=False)
+class Membrane(Energy):
+    """All triangles of a sheet."""
+
+    name = "membrane"
+    elements: IntArray  # (e, 3)
+    gradients: FloatArray  # (e, 3, 2) of the shape functions: B [1/m]
+    weights: FloatArray  # (e,) w [m^3]
+    lame: tuple[float, float]  # lam, mu [Pa]
+
+    def add_gradient(self, x: FloatArray, out: FloatArray) -> float:
+        """See the base class."""
+        shape = self.elements, self.gradients, self.weights
+        return float(add_membrane_gradient(x, *shape, *self.lame, out))
+
+    def add_hessian(self, x: FloatArray, blocks: Blocks, clamp: bool) -> None:
+        """See the base class."""
+        add_membrane_hessian(x, self.gradients, self.weights, *self.lame, clamp, blocks)
 
 
 @compiled
@@ -131,25 +154,22 @@ def eigenpairs(
 @compiled
 def add_membrane_hessian(
     x: FloatArray,
-    triangles: IntArray,
     gradients: FloatArray,
     weights: FloatArray,
     lam: float,
     mu: float,
     clamp: bool,
-    slots: IntArray,
-    stride: IntArray,
-    data: FloatArray,
+    blocks: Blocks,
 ) -> None:
-    """Add every triangle's Hessian [N/m], positive semidefinite if `clamp`, to a sparse matrix.
+    """Add every triangle's Hessian [N/m], positive semidefinite if `clamp`.
 
     In x it is sum_m w value_m q_m q_m^T, with q_m = Q_m B_k at vertex k.
     """
     F, U, s, V = np.empty((3, 2)), np.empty((3, 3)), np.empty(2), np.empty((2, 2))
     values, Q, modes = np.empty(6), np.empty((6, 3, 2)), np.empty((6, 9))
-    for e in range(len(triangles)):
+    for e in range(len(weights)):
         B = gradients[e]
-        deformation_gradient(x, triangles[e], B, F)
+        deformation_gradient(x, blocks.elements[e], B, F)
         singular_frames(F, U, s, V)
         eigenpairs(U, s, V, lam, mu, values, Q)
         for m in range(6):
@@ -159,4 +179,4 @@ def add_membrane_hessian(
             for k in range(3):
                 for a in range(3):
                     modes[m, 3 * k + a] = Q[m, a, 0] * B[k, 0] + Q[m, a, 1] * B[k, 1]
-        scatter(values, modes, triangles[e], slots[e], stride, data)
+        scatter(values, modes, blocks, e)
