@@ -25,8 +25,8 @@ from strainbench.bench.plan import plan
 from strainbench.bench.records import RUNS, STEPS, append_rows
 from strainbench.studies.duel.measure import Entry
 from strainbench.studies.duel.report import Outcome
-from strainbench.studies.ledger import Row
-from strainbench.studies.ledger import as_markdown as ledger_markdown
+from strainbench.studies.ledger.measure import Row
+from strainbench.studies.ledger.report import as_markdown as ledger_markdown
 from tests.command import command
 
 NASTY = (
