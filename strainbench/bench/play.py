@@ -98,8 +98,11 @@ def _what_is_loaded(stage: Stage) -> dict[str, object]:
 def start_warming(journal: Journal) -> None:
     """Tell of the warm-up, and of what numba compiles, which is not to be taken for a hang."""
     journal.write("warming")
-    if "numba" not in sys.modules:
-        return
+    if "numba" in sys.modules:
+        _tell_of_compilation(journal)
+
+
+def _tell_of_compilation(journal: Journal) -> None:
     from numba.core import event
 
     class Teller(event.Listener):  # type: ignore[misc]
