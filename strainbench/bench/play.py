@@ -37,7 +37,7 @@ Task = Callable[[Cell, Path, Path | None], None]
 """What a process of its own does: with a cell, the folder to write to, what it is fed or None."""
 
 
-def play(cell: Cell, folder: Path, recording: Path | None) -> None:
+def play_cell(cell: Cell, folder: Path, recording: Path | None) -> None:
     """Run `cell`, writing to `folder`; `recording` holds the frames to replay."""
     with_journal(folder, lambda journal: _play(cell, folder, journal, recording))
 

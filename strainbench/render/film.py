@@ -26,7 +26,7 @@ def untracked(items: Iterable[Any], what: str, total: int) -> Iterable[Any]:  # 
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class State:
     """The positions (n, 3) [m] after a step, at a time [s], None where a scene has no clock."""
 
     step: int
@@ -36,20 +36,20 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Film:
-    """Frames of one scene and solver.
+    """States of one scene and solver.
 
     Parameters
     ----------
     scene, solver : what the titles say
-    interval : time between frames [s], or None
-    stopped : why the last frames are missing, or ""
+    interval : time between states [s], or None
+    stopped : why the last states are missing, or ""
     obstacles : what the cloth is kept off
     """
 
     scene: str
     solver: str
     problem: Problem
-    frames: list[Frame]
+    states: list[State]
     interval: float | None
     stopped: str = ""
     obstacles: tuple[Obstacle, ...] = ()
@@ -57,7 +57,7 @@ class Film:
     @cached_property
     def strains(self) -> list[FloatArray]:
         """(e,) largest principal strain of each element, for each frame."""
-        return [principal_stretches(self.problem, f.positions)[:, 0] - 1 for f in self.frames]
+        return [principal_stretches(self.problem, f.positions)[:, 0] - 1 for f in self.states]
 
 
 def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
@@ -81,13 +81,13 @@ def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
     scenario = cell.scenario.scenario()
     stage = Stage.opened(scenario, cell.solver.solver(), cell.tolerance)
     step: float | None = getattr(scenario, "step", None)  # a scene without inertia has no clock
-    frames = [Frame(0, None if step is None else 0.0, stage.positions)]
+    states = [State(0, None if step is None else 0.0, stage.positions)]
     stopped = ""
     try:
         for _ in track(stage.steps(cell.steps), f"playing {cell.title}", cell.steps):
             k = stage.step
             if k % every == 0 or k == cell.steps:
-                frames.append(Frame(k, None if step is None else k * step, stage.positions))
+                states.append(State(k, None if step is None else k * step, stage.positions))
     except StageError as error:  # a failing solver is data here too: what was played is shown
         who = cell.solver.label if error.who is Who.SOLVER else error.who
         stopped = f"{who} ended in step {stage.step} of {cell.steps}: {error}"
@@ -95,4 +95,4 @@ def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
     interval = None if step is None else every * step
     contact = scenario.contact() if isinstance(scenario, ClothScenario) else None
     obstacles = contact.obstacles if contact else ()
-    return Film(scene, cell.solver.label, stage.problem, frames, interval, stopped, obstacles)
+    return Film(scene, cell.solver.label, stage.problem, states, interval, stopped, obstacles)

@@ -33,7 +33,7 @@ ALL = 20  # iterates are kept one by one up to this many,
 GROWTH = 1.1  # and from there on where their count has grown by this
 
 
-def trace(cell: Cell, folder: Path, frame: Path | None) -> None:
+def trace_cell(cell: Cell, folder: Path, frame: Path | None) -> None:
     """Run `cell`'s solver on the exported problem at `frame`, writing to `folder`."""
     assert frame is not None
     problem = load_problem(frame)
