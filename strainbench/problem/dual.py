@@ -7,8 +7,11 @@ import numpy as np
 from strainbench.arrays import FloatArray
 from strainbench.problem.problem import Problem
 
+Dual = tuple[float, FloatArray]
+"""A lower bound D(Y), and |Y_i| of the multipliers that it comes from (constraints,)."""
 
-def dual_bound(problem: Problem, multipliers: FloatArray) -> tuple[float, FloatArray]:
+
+def dual_bound(problem: Problem, multipliers: FloatArray) -> Dual:
     """The best D(Y) of any multiple Y of `multipliers` (rows, 3), and its |Y_i| (constraints,).
 
     D = lin^2 / 2 q with lin = <Y, G target> - sum b_i |Y_i| and q = ||G^T Y||^2_{M^-1}, less its
@@ -29,6 +32,14 @@ def dual_bound(problem: Problem, multipliers: FloatArray) -> tuple[float, FloatA
     if not np.isfinite(lower_bound):
         scale, lower_bound = 0.0, 0.0
     return lower_bound, scale * norms
+
+
+def dual_gap(dual: Dual, objective: float, violations: FloatArray) -> float:
+    """f(x) + sum |Y_i| v_i - D(Y), at least 0; infinite where it cannot be computed."""
+    lower_bound, norms = dual
+    priced = float(np.sum(norms * violations, where=norms > 0))
+    gap = objective + priced - lower_bound
+    return float("inf") if np.isnan(gap) else max(0.0, gap)
 
 
 def relative(problem: Problem, gap: float, lower_bound: float) -> float:

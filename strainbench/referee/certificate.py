@@ -6,7 +6,8 @@ its minimum D(Y) at x_Y = target - M^-1 G^T Y on the free vertices. So, in the n
 1. D(Y) = <Y, G target> - 1/2 ||G^T Y||^2_{M^-1} - sum b_i |Y_i| is a lower bound on f(x*);
    with exact limits |Y_i| is the nuclear norm of an element's multiplier matrix.
 2. A point with violations v_i has L(x) <= f(x) + sum |Y_i| v_i, so
-   1/2 ||x - x_Y||^2 <= f(x) + sum |Y_i| v_i - D(Y): its gap, never negative.
+   1/2 ||x - x_Y||^2 <= f(x) + sum |Y_i| v_i - D(Y): its gap, never negative. Of several
+   Y that are known the gap is the least.
 3. A feasible x_ref has 1/2 ||x_ref - x*||^2 <= f(x_ref) - D(Y), and x* the same distance to x_Y
    at most, so ||x - x*|| <= min(||x - x_ref||, ||x - x_Y||) + sqrt(2 (f(x_ref) - D(Y))).
    A feasible x is itself such an x_ref: ||x - x*|| <= sqrt(2 (f(x) - D(Y))).
@@ -27,7 +28,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from strainbench.arrays import FloatArray
-from strainbench.problem.dual import relative
+from strainbench.problem.dual import dual_gap, relative
 from strainbench.problem.problem import Problem
 from strainbench.referee.kkt import kkt_residual
 from strainbench.referee.reference import Reference, reference_of
@@ -145,15 +146,14 @@ def _certify_optimum(
     inside = x.copy()
     inside[problem.isolated] = problem.target[problem.isolated]
     astray = float(np.linalg.norm(x - inside))
-    priced = float(np.sum(ref.multiplier_norms * v, where=ref.multiplier_norms > 0))
-    true_gap = _at_least_0(problem.objective(inside) + priced - ref.lower_bound)
+    true_gap = dual_gap(ref.duals[0], problem.objective(inside), v)
     radius = float(np.sqrt(2 * true_gap / problem.least_weight))
     apart = float(np.linalg.norm(inside - ref.positions))
     bound = float(np.fmin(apart, radius)) + ref.error
     if worst == 0:
         bound = min(bound, radius)
     objective = problem.objective(x)
-    total = _at_least_0(objective + priced - ref.lower_bound)
+    total = min(dual_gap(dual, objective, v) for dual in ref.duals)
     relative_gap = relative(problem, total, ref.lower_bound)
     outcome, reason = _outcome(ref, worst, relative_gap, violation, gap)
     return Certificate(
@@ -235,11 +235,6 @@ def _violations(problem: Problem, x: FloatArray) -> FloatArray:
     """Those of finite positions: infinite where they are too large to be computed."""
     v = problem.violations(x)
     return np.where(np.isnan(v), np.inf, v)
-
-
-def _at_least_0(gap: float) -> float:
-    """A gap without its rounding; one that cannot be computed is infinite."""
-    return float("inf") if np.isnan(gap) else max(0.0, gap)
 
 
 def _largest_singular_value(problem: Problem, x: FloatArray) -> float:

@@ -6,6 +6,9 @@ judged by its own positions alone.
 A solver is given bounds that are tighter by a hair, or by more where that does not suffice, so that
 its positions are feasible; bound and error are then computed from positions and multipliers alone.
 
+A degenerate optimum has many multipliers, and the largest price a violation that the outcome allows
+at more than the gap it allows. Where they are dear, other solvers are asked for cheaper ones too.
+
 A problem with lower bounds is not convex. Its reference is a local optimum found from the target,
 an objective to compare with and nothing more.
 """
@@ -21,7 +24,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray
 from strainbench.plugins import UnavailableError
-from strainbench.problem.dual import dual_bound, relative
+from strainbench.problem.dual import Dual, dual_bound, relative
 from strainbench.problem.problem import Problem
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, run_solver
@@ -37,8 +40,10 @@ LAST_TOLERANCE, LOCAL_TOLERANCE = 1e-6, 1e-6
 ATTEMPTS = 4  # each but the first with bounds tightened further, by three times the violation
 ENOUGH = 1e-6  # relative gap of a reference that needs no second solver
 MARGIN = 3e-13  # of the first attempt, above what the reference solver leaves of violation
+ALLOWED = 1e-6  # violation of an optimal answer, by default of `certify`
+DEAR = 1e-2  # relative gap from that violation in every constraint; of cloth scenes it is 1e-4
 ACTIVE = 1e-6  # constraints this close to their bound count as active
-Kept = dict[str, tuple[FloatArray, FloatArray, str | None]]
+Kept = dict[str, tuple[FloatArray, list[FloatArray], str | None]]
 """Positions, multipliers, and why they are no optimum, by the content of the problem."""
 
 
@@ -55,6 +60,7 @@ class Reference:
     active_constraints : constraints within ACTIVE of their bound
     infeasible : why no positions can meet the limits, where that is certain
     failure : what the reference solvers said, or raised, where they found no optimum
+    cheaper : lower bound and |Y_i| of other multipliers, which price violations less
     """
 
     positions: FloatArray
@@ -64,6 +70,13 @@ class Reference:
     active_constraints: int
     infeasible: str | None = None
     failure: str | None = None
+    cheaper: Dual | None = None
+
+    @property
+    def duals(self) -> list[Dual]:
+        """What is known from multipliers, the highest lower bound first."""
+        best = self.lower_bound, self.multiplier_norms
+        return [best] if self.cheaper is None else [best, self.cheaper]
 
 
 def local(problem: Problem, positions: FloatArray) -> Reference:
@@ -118,31 +131,39 @@ class ReferenceSolver:
             key = content_key(problem)
             if key not in self._kept:
                 self._kept[key] = self._solve(problem)
-            positions, multipliers, failure = self._kept[key]
-            return replace(verify(problem, positions, multipliers), failure=failure)
+            positions, (best, cheaper), failure = self._kept[key]
+            reference = replace(verify(problem, positions, best), failure=failure)
+            if cheaper is best or not problem.convex:
+                return reference
+            return replace(reference, cheaper=dual_bound(problem, cheaper))
 
-    def _solve(self, problem: Problem) -> tuple[FloatArray, FloatArray, str | None]:
+    def _solve(self, problem: Problem) -> tuple[FloatArray, list[FloatArray], str | None]:
         """Positions, multipliers, and what the solvers said where these are no optimum.
 
-        The next solver is asked where those before left no answer with a gap below ENOUGH.
+        The next solver is asked where those before left no answer with a gap below ENOUGH, or
+        only multipliers that are DEAR. Of these the best are kept, and the best with that price.
         """
         positions = np.full_like(problem.target, np.nan)
-        multipliers = np.zeros((problem.rows, 3))
+        multipliers = [np.zeros((problem.rows, 3))] * 2
         if len(problem.free) == 0 or problem.infeasible_pins():
             return positions, multipliers, None
-        said = []
+        said, enough = [], False
         for solver in self._solvers:
             try:
                 for solution in self._attempts(solver, problem):
                     positions = _better_positions(problem, solution.positions, positions)
-                    multipliers = _better_multipliers(problem, solution.multipliers, multipliers)
+                    multipliers = [
+                        _better_multipliers(problem, solution.multipliers, old, price)
+                        for old, price in zip(multipliers, (0.0, ALLOWED), strict=True)
+                    ]
                 said.append(f"{solver.label}: {solution.status}")
             except Exception as error:  # whatever it is: answers can be judged without
                 words = " ".join(str(error).split())
                 said.append(f"{solver.label}: {type(error).__name__}: {words}")
-            if _enough(problem, positions, multipliers):
-                return positions, multipliers, None
-        return positions, multipliers, "; ".join(said) or None
+            enough = _enough(problem, positions, multipliers[0])
+            if enough and not _dear(problem, *multipliers):
+                break
+        return positions, multipliers, None if enough else "; ".join(said) or None
 
     def _attempts(self, solver: Solver, problem: Problem) -> Iterator[Solution]:
         """Solutions with bounds that are tightened until one is feasible."""
@@ -173,13 +194,23 @@ def _better_positions(problem: Problem, new: FloatArray, old: FloatArray) -> Flo
     return new if within and problem.objective(new) <= problem.objective(old) else old
 
 
-def _better_multipliers(problem: Problem, new: FloatArray | None, old: FloatArray) -> FloatArray:
-    """The multipliers with the higher lower bound."""
+def _better_multipliers(
+    problem: Problem, new: FloatArray | None, old: FloatArray, price: float
+) -> FloatArray:
+    """The multipliers with the higher lower bound, less the price of violations so large."""
     if not problem.convex or new is None:
         return old
-    nowhere = np.full_like(problem.target, np.nan)
-    bounds = [verify(problem, nowhere, Y).lower_bound for Y in (new, old)]
-    return new if bounds[0] > bounds[1] else old
+    duals = (dual_bound(problem, Y) for Y in (new, old))
+    values = [bound - price * float(norms.sum()) for bound, norms in duals]
+    return new if values[0] > values[1] else old
+
+
+def _dear(problem: Problem, best: FloatArray, cheaper: FloatArray) -> bool:
+    """Whether violations of ALLOWED cost more than DEAR, with the cheaper multipliers too."""
+    if not problem.convex:
+        return False
+    (highest, _), (bound, norms) = (dual_bound(problem, Y) for Y in (best, cheaper))
+    return relative(problem, highest - bound + ALLOWED * float(norms.sum()), highest) > DEAR
 
 
 def _enough(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from strainbench.problem.dual import dual_bound, relative
+from strainbench.problem.dual import dual_bound, dual_gap, relative
 from strainbench.problem.problem import Problem
 from strainbench.solver.solver import Solution
 
@@ -24,9 +24,8 @@ def claimed(problem: Problem, solution: Solution, tolerance: float) -> Solution:
     violations = problem.violations(x)
     worst, gap = float(np.max(violations)), 0.0
     if problem.convex and Y is not None:
-        lower_bound, norms = dual_bound(problem, Y)
-        above = problem.objective(x) + float(norms @ violations) - lower_bound
-        gap = relative(problem, above, lower_bound)
+        dual = dual_bound(problem, Y)
+        gap = relative(problem, dual_gap(dual, problem.objective(x), violations), dual[0])
     if not worst <= tolerance:
         return replace(solution, status=f"inaccurate: violation {worst:.1e}")
     if not gap <= tolerance:

@@ -81,3 +81,20 @@ def test_nothing_raises_and_nothing_false_is_said(seed):
         assert certificate.outcome in OUTCOMES
         answers[name] = found.positions, found.status, certificate
     assert not list(falsehoods(problem, reference, answers))
+
+
+def test_violations_are_priced_by_the_cheapest_multipliers_known():
+    """Two pins at their exact limit: multipliers grow without end, and price 1e-6 at a gap of 9%.
+
+    The answer's own prove it to be optimal, and those of the reference's other solvers too.
+    """
+    problem = hard_problem(np.random.default_rng([2026, 707]))
+    found = solve(problem, "dykstra-plain", time_limit=5.0)
+    reference = reference_of(problem)
+    (bound, norms), (cheaper_bound, cheaper_norms) = reference.duals
+    assert cheaper_bound <= bound
+    assert cheaper_norms.sum() <= norms.sum()
+    certificate = certify(problem, found.positions, reference=reference)
+    assert (found.status, certificate.outcome) == ("solved", "optimal")
+    assert 0 < certificate.max_violation < 1e-6
+    assert certificate.lower_bound == bound
