@@ -18,6 +18,7 @@ import numpy as np
 import psutil
 
 import strainbench.bench.play
+import strainbench.scenario.stage
 import strainbench.solver.solver
 from strainbench import Solution, Solver
 
@@ -641,6 +642,6 @@ class FalseClaim(Harmless, Solver):
 
     def solve(self, problem, state, *, tolerance, monitor, deadline):
         run = strainbench.solver.solver.run_solver
-        strainbench.bench.play.run_solver = lambda *args: replace(run(*args), seconds=0.0)
+        strainbench.scenario.stage.run_solver = lambda *args: replace(run(*args), seconds=0.0)
         time.sleep(0.3)
         return Solution(problem.target.copy(), "solved", 0)

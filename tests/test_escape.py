@@ -23,10 +23,10 @@ from strainbench import escape
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.plan import plan
 from strainbench.bench.records import RUNS, STEPS, append_rows
-from strainbench.studies.duel.measure import Entry
+from strainbench.studies.duel.measure import Racer
 from strainbench.studies.duel.report import Outcome
-from strainbench.studies.ledger import Row
-from strainbench.studies.ledger import as_markdown as ledger_markdown
+from strainbench.studies.ledger.measure import Row
+from strainbench.studies.ledger.report import as_markdown as ledger_markdown
 from tests.command import command
 
 NASTY = (
@@ -253,7 +253,7 @@ def test_a_comparison_shows_any_text_as_it_is(folder, nasty, monkeypatch, capsys
 
 
 def test_a_duel_shows_any_text_as_it_is(nasty):
-    entry = Entry(nasty, setups=[0.1], seconds=[0.5, 0.6])
+    entry = Racer(nasty, setups=[0.1], seconds=[0.5, 0.6])
     facts = {"memory_gb": 1, "system": nasty, "python": "3", "threads_per_solver": 1}
     outcome = Outcome(nasty, f"strainbench duel {nasty}", {nasty: facts}, [entry])
     file = io.StringIO()

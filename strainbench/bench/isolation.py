@@ -14,7 +14,7 @@ import psutil
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import EVENTS, GO, read_journal
-from strainbench.bench.play import Task, play
+from strainbench.bench.play import Task, play_cell
 from strainbench.bench.process import Child, Family
 
 START_LIMIT = 180.0  # [s] to import the suite and plug-ins and to build the problem, cold disks
@@ -60,7 +60,7 @@ class Running:
         folder: Path,
         recording: Path | None,
         memory_limit_mb: float,
-        task: Task = play,
+        task: Task = play_cell,
     ) -> Running:
         """Start `task` in a new process."""
         folder.mkdir(parents=True)

@@ -79,7 +79,7 @@ def judge(cell: Cell, folder: Path, ending: str, kept: Kept | None = None) -> Ve
 
     Parameters
     ----------
-    folder : what `play` wrote
+    folder : what `play_cell` wrote
     ending : why the process was stopped from outside, or ""
     kept : references known, and to be known
     """

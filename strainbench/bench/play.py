@@ -10,13 +10,11 @@ from __future__ import annotations
 import sys
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import fields
+from functools import partial
 from itertools import groupby
-from numbers import Integral, Real
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_info
@@ -25,12 +23,10 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import GO, Journal, read_events, read_targets
+from strainbench.physics.integrators import Project
 from strainbench.plugins import told
-from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import StepReport
-from strainbench.solver.solver import Solution, Solver, run_solver, warm_up
-
-LONGEST_STATUS = 1000  # characters
+from strainbench.scenario.stage import Projection, Stage, StageError
 
 
 class Stop(Exception):  # noqa: N818
@@ -41,7 +37,7 @@ Task = Callable[[Cell, Path, Path | None], None]
 """What a process of its own does: with a cell, the folder to write to, what it is fed or None."""
 
 
-def play(cell: Cell, folder: Path, recording: Path | None) -> None:
+def play_cell(cell: Cell, folder: Path, recording: Path | None) -> None:
     """Run `cell`, writing to `folder`; `recording` holds the frames to replay."""
     with_journal(folder, lambda journal: _play(cell, folder, journal, recording))
 
@@ -54,81 +50,59 @@ def with_journal(folder: Path, work: Callable[[Journal], None]) -> None:
     except Stop as stop:
         journal.write("failed", reason=str(stop))
     except BaseException as error:  # a solver's own error, sys.exit among them, becomes a row
-        journal.write("failed", reason=told(error))
+        reason = error.reason if isinstance(error, StageError) else told(error)
+        journal.write("failed", reason=reason)
         with suppress(Exception):  # a solver may have closed what prints
             traceback.print_exc()
     journal.write("ended", peak_memory_mb=_peak_memory_mb())
 
 
 def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) -> None:
-    scenario = cell.scenario.scenario()
-    problem = scenario.problem()
-    solver = cell.solver.solver()
-    threads = max((pool["num_threads"] for pool in threadpool_info()), default=1)
-    journal.write(
-        "loaded",
-        variables=3 * len(problem.free),
-        constraints=int(problem.constraints),
-        nonzeros=int(3 * problem.G.nnz),
-        needs=", ".join(sorted(scenario.needs)),
-        blas_threads=threads,
-        notes=scenario.notes(),
-    )
+    stage = Stage(cell.scenario.scenario(), cell.solver.solver(), cell.tolerance, journal.clock)
+    journal.write("loaded", **_what_is_loaded(stage))
     start_warming(journal)
-    if refusal := solver.supports(problem):
+    if refusal := stage.refusal():
         raise Stop(f"{Ending.UNSUPPORTED}: {refusal}")
-    warm_up(solver, problem, cell.tolerance)
-    if recording is None:
-        scenario.warm_up()
+    stage.warm_up(physics=recording is None)
     wait_for_go(folder, journal)
-    begin = journal.clock()
-    state = solver.prepare(problem)
-    journal.write("setup", seconds=journal.clock() - begin)
-    table = _Table(cell, solver, problem, state, journal, begin)
-    steps = replay(recording, table.project) if recording else scenario.play(table.project)
-    for step, report in enumerate(steps, start=1):
-        journal.write("step", step=step, **_facts(report))
-        if step == cell.steps:
-            return
-        table.step = step + 1
-        table.check_time()
-    raise Stop("the scene has no more steps")
+    timer = _Timer(cell.time_limit, journal.clock)
+    stage.set_up()
+    journal.write("setup", seconds=timer.elapsed())
+
+    def project(target: FloatArray) -> FloatArray:
+        timer.check()
+        projection = stage.solve(target, timer.remaining())
+        write_down(journal, projection)
+        return stage.accept(projection)
+
+    fed = partial(replay, recording) if recording else None
+    for report in stage.steps(cell.steps, project, fed):
+        journal.write("step", step=stage.step, **vars(report))
+        if stage.step < cell.steps:
+            timer.check()
 
 
-def _facts(report: StepReport) -> dict[str, float]:
-    """A scene's report on a step, all numbers."""
-    if not isinstance(report, StepReport):
-        raise Stop(f"the scene yields {type(report).__name__}, not a StepReport")
-    found = {f.name: getattr(report, f.name) for f in fields(StepReport)}
-    return {k: _number(v, f"the scene's {k}") for k, v in found.items()}
-
-
-def _number(value: object, what: str) -> float:
-    """A real number as JSON can hold it."""
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    try:
-        if isinstance(value, Integral) and abs(int(value)) < 2**63:
-            return int(value)
-        if isinstance(value, Real):
-            return float(value)
-    except OverflowError:
-        pass  # a whole number of more digits than floats reach
-    raise Stop(f"{what} is {_short(value)}: a number is valid")
-
-
-def _short(value: object) -> str:
-    try:
-        return repr(value)[:80]
-    except Exception as error:  # a plug-in's own type
-        return f"a {type(value).__name__} ({told(error)[:80]})"
+def _what_is_loaded(stage: Stage) -> dict[str, object]:
+    """How large the problem is, and what the scene says of itself."""
+    problem, scenario = stage.problem, stage.scenario
+    return {
+        "variables": 3 * len(problem.free),
+        "constraints": int(problem.constraints),
+        "nonzeros": int(3 * problem.G.nnz),
+        "needs": ", ".join(sorted(scenario.needs)),
+        "blas_threads": max((pool["num_threads"] for pool in threadpool_info()), default=1),
+        "notes": scenario.notes(),
+    }
 
 
 def start_warming(journal: Journal) -> None:
     """Tell of the warm-up, and of what numba compiles, which is not to be taken for a hang."""
     journal.write("warming")
-    if "numba" not in sys.modules:
-        return
+    if "numba" in sys.modules:
+        _tell_of_compilation(journal)
+
+
+def _tell_of_compilation(journal: Journal) -> None:
     from numba.core import event
 
     class Teller(event.Listener):  # type: ignore[misc]
@@ -159,7 +133,7 @@ def wait_for_go(folder: Path, journal: Journal) -> None:
     journal.write("started")
 
 
-def replay(recording: Path, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
+def replay(recording: Path, project: Project) -> Iterator[StepReport]:
     """Project the candidates of a recorded run, step by step, whatever became of them."""
     events = [e for e in read_events(recording) if e["event"] == "projection"]
     targets = read_targets(recording, len(events))
@@ -169,70 +143,41 @@ def replay(recording: Path, project: Callable[[FloatArray], FloatArray]) -> Iter
         yield StepReport()
 
 
-class _Table:
-    """Where candidates meet the solver: each projection timed and written down."""
+class _Timer:
+    """A cell's time, from now on."""
 
-    def __init__(
-        self,
-        cell: Cell,
-        solver: Solver,
-        problem: Problem,
-        state: Any,
-        journal: Journal,
-        begin: float,
-    ) -> None:
-        self.cell, self.solver, self.problem, self.state = cell, solver, problem, state
-        self.journal, self.begin, self.step = journal, begin, 1
+    def __init__(self, limit: float | None, clock: Callable[[], float]) -> None:
+        self._limit, self._clock, self._begin = limit, clock, clock()
+
+    def elapsed(self) -> float:
+        """Seconds so far."""
+        return self._clock() - self._begin
 
     def remaining(self) -> float | None:
-        """Seconds left of the cell's time, or None without a limit."""
-        limit = self.cell.time_limit
-        return None if limit is None else limit - (self.journal.clock() - self.begin)
+        """Seconds left of it, or None without a limit."""
+        return None if self._limit is None else self._limit - self.elapsed()
 
-    def check_time(self) -> None:
+    def check(self) -> None:
         """End the cell at its limit."""
         remaining = self.remaining()
         if remaining is not None and remaining <= 0:
-            raise Stop(f"{Ending.TIME_LIMIT} of {self.cell.time_limit:g} s")
-
-    def project(self, target: FloatArray) -> FloatArray:
-        """Limit one candidate; an answer that is not usable ends the cell."""
-        self.check_time()
-        if not np.all(np.isfinite(target)):
-            raise Stop("the simulation has left the finite numbers")
-        problem = self.problem.with_target(target)
-        remaining = self.remaining()
-        begin = self.journal.clock()
-        solution = run_solver(self.solver, problem, self.state, self.cell.tolerance, remaining)
-        facts: dict[str, Any] = {"begin": begin, "end": self.journal.clock()}
-        facts |= what_it_says(solution)
-        positions = np.asarray(solution.positions)
-        usable = positions.shape == target.shape and positions.dtype == np.float64
-        self.journal.frame(target, positions if usable else np.full_like(target, np.nan))
-        self.journal.write("projection", step=self.step, seconds=solution.seconds, **facts)
-        if not usable:
-            raise Stop(f"positions of shape {positions.shape}, type {positions.dtype}")
-        if not np.all(np.isfinite(positions)):
-            raise Stop(f"positions that are not finite; it says {facts['status']!r}")
-        return positions.copy()  # a solver may keep its own, and the problem's are read-only
+            raise Stop(f"{Ending.TIME_LIMIT} of {self._limit:g} s")
 
 
-def what_it_says(solution: Solution) -> dict[str, Any]:
-    """Iterations, status and details of a solver's answer; one that is of no use ends the cell."""
-    iterations, details = _number(solution.iterations, "iterations"), solution.details
-    if iterations != iterations // 1 or iterations < 0:
-        raise Stop(f"iterations is {_short(iterations)}: a whole number from 0 on is valid")
-    if not isinstance(details, Mapping):
-        raise Stop(f"details is {_short(details)}: a dict of numbers is valid")
-    try:
-        status = str(solution.status)[:LONGEST_STATUS]
-    except Exception as error:  # of a solver's own type
-        raise Stop(f"a status that cannot be written ({told(error)})") from None
-    return {
-        "iterations": int(iterations),
-        "status": status,
-        "details": {str(k): _number(v, f"details[{_short(k)}]") for k, v in details.items()},
-    }
+def write_down(journal: Journal, projection: Projection) -> None:
+    """Candidate and answer, and what the solver says of it; before anything is made of it."""
+    target, solution = projection.frame.target, projection.solution
+    journal.frame(target, solution.positions if projection.fits else np.full_like(target, np.nan))
+    journal.write(
+        "projection",
+        step=projection.step,
+        seconds=solution.seconds,
+        begin=projection.begin,
+        end=projection.end,
+        iterations=solution.iterations,
+        status=solution.status,
+        details=dict(solution.details),
+    )
 
 
 def _peak_memory_mb() -> float:

@@ -13,8 +13,8 @@ from strainbench.bench.cell import Cell, PluginRef
 from strainbench.files import locked, open_folder
 from strainbench.problem.problem import Problem
 from strainbench.referee.reference import REFERENCE_SOLVER
+from strainbench.scenario.stage import Stage, StageError, Who
 from strainbench.solver.registry import find_solver
-from strainbench.solver.solver import run_solver
 
 
 def recorder(cell: Cell) -> Cell:
@@ -75,11 +75,7 @@ def record_all(
     """
     if number < 1:
         raise ValueError(f"--frame {number}: a whole number above 0 is valid")
-    scenario, solver = cell.scenario.scenario(), cell.solver.solver()
-    problem = scenario.problem()
-    if refusal := solver.supports(problem):
-        raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
-    state = solver.prepare(problem)
+    stage = Stage.opened(cell.scenario.scenario(), cell.solver.solver(), cell.tolerance)
     targets: list[FloatArray] = []
     seconds: list[float] = []
 
@@ -88,23 +84,26 @@ def record_all(
         progress(len(targets))
         if len(targets) == number:
             raise _Reached
-        solution = run_solver(solver, problem.with_target(target), state, cell.tolerance)
-        if not np.all(np.isfinite(solution.positions)):
-            raise ValueError(
-                f"--frame {number}: {solver.label} has no answer to projection {len(targets)}; "
-                f"it says {str(solution.status)!r}"
-            )
-        return solution.positions
+        return stage.project(target)
 
     try:
-        for report in scenario.play(project):
+        for report in stage.steps(project=project):
             seconds.append(report.ie_seconds)
     except _Reached:
-        return Recording(problem, np.stack(targets), np.array(seconds))
+        return Recording(stage.problem, np.stack(targets), np.array(seconds))
+    except StageError as error:
+        raise ValueError(f"--frame {number}: {_failed(stage, error, len(targets))}") from error
     raise ValueError(
-        f"--frame {number}: {scenario.name} asks for {len(targets)} projections, "
+        f"--frame {number}: {stage.scenario.name} asks for {len(targets)} projections, "
         f"so 1 to {len(targets)} are valid"
     )
+
+
+def _failed(stage: Stage, error: StageError, asked: int) -> str:
+    """In words what ended a recording after so many candidates."""
+    if error.who is Who.SCENE:
+        return f"{stage.scenario.name} ended after {asked} projections: {error}"
+    return f"{stage.solver.label} has no answer to projection {asked}: {error}"
 
 
 def recorded(

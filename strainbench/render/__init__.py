@@ -84,7 +84,7 @@ def render(
     Parameters
     ----------
     formats : of FORMATS, with commas
-    top : strain at the end of the colour scale, the same for every frame; None is from the data
+    top : strain at the end of the colour scale, the same for every state; None is from the data
 
     Raises
     ------
@@ -111,11 +111,11 @@ def write_film(
 ) -> list[str]:
     """Write a film in each of `kinds` to `folder`; return a line for each."""
     lines = []
-    digits = max(4, len(str(film.frames[-1].step)))
+    digits = max(4, len(str(film.states[-1].step)))
     for kind in [k for k in kinds if k in MESH_FORMATS]:
         paths = write_meshes(film, kind, folder, track, digits)
-        lines.append(_wrote(paths[: len(film.frames)]))
-        lines += [f"wrote {path}" for path in paths[len(film.frames) :]]
+        lines.append(_wrote(paths[: len(film.states)]))
+        lines += [f"wrote {path}" for path in paths[len(film.states) :]]
     if not {"png", "gif", "mp4"} & set(kinds):
         return lines
     with TemporaryDirectory() as scratch:
@@ -138,12 +138,12 @@ def draw_all(
     top: float | None = None,
     track: Track = untracked,
 ) -> list[Path]:
-    """One PNG a frame, named by its step."""
+    """One PNG a state, named by its step."""
     picture = Picture(film, camera, top)
-    digits = max(4, len(str(film.frames[-1].step)))
+    digits = max(4, len(str(film.states[-1].step)))
     paths = []
-    for index in track(range(len(film.frames)), "drawing", len(film.frames)):
-        path = folder / f"frame-{film.frames[index].step:0{digits}d}.png"
+    for index in track(range(len(film.states)), "drawing", len(film.states)):
+        path = folder / f"frame-{film.states[index].step:0{digits}d}.png"
         Image.fromarray(picture.draw(index)).save(path, dpi=(DPI, DPI))
         paths.append(path)
     return paths

@@ -12,7 +12,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.problem import Problem
-from strainbench.render.film import Film, Frame, Track, principal_stretches, untracked
+from strainbench.render.film import Film, State, Track, principal_stretches, untracked
 
 MESH_FORMATS = ("obj", "ply", "vtu")
 
@@ -46,15 +46,15 @@ def element_data(problem: Problem, positions: FloatArray) -> dict[str, FloatArra
 def write_meshes(
     film: Film, kind: str, folder: Path, track: Track = untracked, digits: int = 4
 ) -> list[Path]:
-    """One file a frame, and for VTU the collection `frames.pvd` that gives their times."""
+    """One file a state, and for VTU the collection `frames.pvd` that gives their times."""
     paths = []
-    frames: Iterable[Frame] = track(film.frames, f"writing {kind.upper()}", len(film.frames))
-    for frame in frames:
-        path = folder / f"frame-{frame.step:0{digits}d}.{kind}"
-        meshio.write(path, _mesh(film.problem, frame.positions, kind))
+    states: Iterable[State] = track(film.states, f"writing {kind.upper()}", len(film.states))
+    for state in states:
+        path = folder / f"frame-{state.step:0{digits}d}.{kind}"
+        meshio.write(path, _mesh(film.problem, state.positions, kind))
         paths.append(path)
     if kind == "vtu":
-        times = [float(f.step) if f.time is None else f.time for f in film.frames]
+        times = [float(f.step) if f.time is None else f.time for f in film.states]
         paths.append(write_collection(folder / "frames.pvd", times, paths))
     return paths
 

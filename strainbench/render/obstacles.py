@@ -19,7 +19,7 @@ def patches(obstacles: Sequence[Obstacle], cloth: FloatArray) -> tuple[FloatArra
 
     Parameters
     ----------
-    cloth : (n, 3) positions over all frames [m]: a floor reaches a little beyond them
+    cloth : (n, 3) positions over all states [m]: a floor reaches a little beyond them
     """
     vertices, faces = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
     for obstacle in obstacles:

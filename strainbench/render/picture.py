@@ -1,4 +1,4 @@
-"""A frame as a picture: an orthographic painter's view, coloured by the largest principal strain.
+"""A state as a picture: an orthographic painter's view, coloured by the largest principal strain.
 
 Camera and colour scale are chosen once for a whole film.
 """
@@ -49,7 +49,7 @@ def nice_above(value: float, steps: Sequence[float] = ROUND) -> float:
 
 
 def colour_top(film: Film) -> float:
-    """End of the colour scale: above the limits, and above 99.9% of what any frame shows."""
+    """End of the colour scale: above the limits, and above 99.9% of what any state shows."""
     limits = film.problem.limits.bounds - 1
     seen = max(float(np.quantile(strains, 0.999)) for strains in film.strains)
     return nice_above(max(seen, 1.1 * float(limits.max()), 1e-6))
@@ -95,18 +95,18 @@ def shades(seen: FloatArray, faces: IntArray) -> FloatArray:
 
 
 class Picture:
-    """Draws one frame of a film after another on the same canvas.
+    """Draws one state of a film after another on the same canvas.
 
     Parameters
     ----------
-    top : strain at the end of the colour scale; by default from all frames.
+    top : strain at the end of the colour scale; by default from all states.
     """
 
     def __init__(self, film: Film, camera: Camera | None = None, top: float | None = None) -> None:
         self.film, self.camera = film, camera or Camera()
         self.problem = film.problem
         self.faces, self.owner = surface(self.problem)
-        everywhere = np.concatenate([f.positions for f in film.frames])
+        everywhere = np.concatenate([f.positions for f in film.states])
         self.obstacles, patched = patches(film.obstacles, everywhere)
         self.all_faces = np.concatenate([self.faces, patched + self.problem.vertices])
         self.norm = Normalize(0.0, 100 * (colour_top(film) if top is None else top))
@@ -117,11 +117,11 @@ class Picture:
         self._words()
 
     def _stage(self) -> None:
-        """The axes of the mesh, whose window holds every frame."""
+        """The axes of the mesh, whose window holds every state."""
         ax = self.ax = self.figure.add_axes((0.03, 0.04, 0.75, 0.81))
         ax.set_axis_off()
         ax.set_aspect("equal")
-        shown = [f.positions for f in self.film.frames] + [self.obstacles]
+        shown = [f.positions for f in self.film.states] + [self.obstacles]
         seen = np.concatenate([self.camera.view(x)[:, :2] for x in shown])
         low, high = seen.min(axis=0), seen.max(axis=0)
         margin = 0.05 * float((high - low).max())
@@ -183,7 +183,7 @@ class Picture:
             )
 
     def _words(self) -> None:
-        """Titles; those that change with the frames are filled in by `draw`."""
+        """Titles; those that change with the state are filled in by `draw`."""
         self.heading = self.figure.text(0.03, 0.935, chart(self.film.scene), size=13, weight="bold")
         self.line = self.figure.text(0.03, 0.885, "", size=10.5, color="#333333")
         if len(self.problem.pinned):
@@ -199,9 +199,9 @@ class Picture:
             handle.set_zorder(5)
 
     def draw(self, index: int) -> NDArray[np.uint8]:
-        """(height, width, 3) pixels of the frame of that index."""
-        frame, strains = self.film.frames[index], self.film.strains[index]
-        seen = self.camera.view(np.concatenate([frame.positions, self.obstacles]))
+        """(height, width, 3) pixels of the state of that index."""
+        state, strains = self.film.states[index], self.film.strains[index]
+        seen = self.camera.view(np.concatenate([state.positions, self.obstacles]))
         faces = self.all_faces
         depth = seen[faces, 2].mean(axis=1)
         depth[len(self.faces) :] -= self.problem.edge_length  # flat triangles on a ball sink in
@@ -214,7 +214,7 @@ class Picture:
         self.cloth.set_facecolor(colours)
         self.cloth.set_edgecolor(edges * colours)
         self.pins.set_data(*seen[self.problem.pinned, :2].T)
-        clock = f"step {frame.step}" if frame.time is None else f"t = {frame.time:.3f} s"
+        clock = f"step {state.step}" if state.time is None else f"t = {state.time:.3f} s"
         self.line.set_text(
             f"{chart(self.film.solver)},  {clock},  largest strain {100 * strains.max():.2f}%"
         )

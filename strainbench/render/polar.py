@@ -138,7 +138,7 @@ def draw_polar(films: Sequence[Film], curve: tuple[FloatArray, FloatArray] | Non
 
 def _strains(film: Film) -> FloatArray:
     """(e, a) [%] over all triangles and ANGLES, at the last frame."""
-    positions = film.frames[-1].positions
+    positions = film.states[-1].positions
     return 100 * (directional_stretches(film.problem, positions, ANGLES) - 1)
 
 
@@ -236,8 +236,8 @@ def _axes(ax: PolarAxes, strains: Sequence[FloatArray], top: float) -> None:
 
 
 def _title(films: Sequence[Film]) -> str:
-    last = films[0].frames[-1]
+    last = films[0].states[-1]
     clock = f"step {last.step}" if last.time is None else f"t = {last.time:.3g} s"
-    if len({film.frames[-1].step for film in films}) > 1:
+    if len({film.states[-1].step for film in films}) > 1:
         clock = "last frame of each"
     return f"{chart(films[0].scene)}, {clock}: strain over the material angle"

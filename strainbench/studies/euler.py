@@ -27,8 +27,9 @@ from strainbench.physics.integrators import Motion, Project, step_and_project
 from strainbench.physics.linear import LinearSolver, available_linear_solvers
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.registry import find_scenario
+from strainbench.scenario.stage import Stage
 from strainbench.solver.registry import find_solver
-from strainbench.solver.solver import Solver, run_solver
+from strainbench.solver.solver import Solver
 
 
 @dataclass(frozen=True)
@@ -73,13 +74,7 @@ def profile(
 
 def projection(scenario: ClothScenario, solver: Solver, tolerance: float = 1e-6) -> Project:
     """Onto the limits of a scene."""
-    problem = scenario.problem()
-    if refusal := solver.supports(problem):
-        raise ValueError(f"{solver.label} cannot take {scenario.name}: {refusal}")
-    state = solver.prepare(problem)
-    return lambda target: (
-        run_solver(solver, problem.with_target(target), state, tolerance).positions
-    )
+    return Stage.opened(scenario, solver, tolerance).project
 
 
 def _measure(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from itertools import islice
-
 import pytest
 
 from scenarios.swing import Swing
 from strainbench import certify
 from strainbench.referee.reference import REFERENCE_SOLVER
+from strainbench.scenario.stage import Stage
 from strainbench.solver.registry import find_solver, list_solvers
 from strainbench.solver.solver import run_solver, warm_up
 
@@ -21,16 +20,9 @@ def frame(request):
     """The candidate of the tenth step, as the reference solver's run reaches it."""
     resolution, limit = request.param
     scene = Swing(resolution=resolution, limit=limit)
-    problem, reference = scene.problem(), find_solver(REFERENCE_SOLVER)
-    state = reference.prepare(problem)
-    targets = []
-
-    def project(target):
-        targets.append(target)
-        return run_solver(reference, problem.with_target(target), state, TOLERANCE).positions
-
-    list(islice(scene.play(project), 10))
-    return problem.with_target(targets[-1])
+    stage = Stage.opened(scene, find_solver(REFERENCE_SOLVER), TOLERANCE)
+    list(stage.steps(10))
+    return stage.frame
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -17,7 +17,7 @@ from strainbench.bench.plan import plan_one
 from strainbench.render import FORMATS, Camera, Film, Picture, render, write_film
 from strainbench.render.animation import durations
 from strainbench.render.export import surface
-from strainbench.render.film import Frame, principal_stretches, shoot
+from strainbench.render.film import State, principal_stretches, shoot
 from strainbench.render.picture import DPI, SIZE, nice_above
 from strainbench.render.polar import admissible, directional_stretches, draw_polar, polar
 from tests.cli.test_cli import strainbench
@@ -35,7 +35,7 @@ def film():
 
 def vars_of(film):
     """What a film has beside its names."""
-    return film.problem, film.frames, film.interval
+    return film.problem, film.states, film.interval
 
 
 def stretched(rng, stretches=(1.3, 0.8)):
@@ -46,11 +46,11 @@ def stretched(rng, stretches=(1.3, 0.8)):
 
 
 def test_a_film_keeps_the_start_each_kth_step_and_the_last(film):
-    assert [f.step for f in film.frames] == [0, 2, 4, 5]
-    assert [f.time for f in film.frames] == pytest.approx([0, 2 / 60, 4 / 60, 5 / 60])
+    assert [f.step for f in film.states] == [0, 2, 4, 5]
+    assert [f.time for f in film.states] == pytest.approx([0, 2 / 60, 4 / 60, 5 / 60])
     assert film.interval == pytest.approx(2 / 60)
     assert not film.stopped
-    for frame in film.frames:
+    for frame in film.states:
         assert film.problem.violations(frame.positions).max() < 1e-5
 
 
@@ -98,7 +98,7 @@ def test_one_sample_leaves_other_directions_free():
 @pytest.mark.parametrize("kind", ["obj", "ply", "vtu"])
 def test_meshes_read_back(film, kind, tmp_path):
     write_film(film, [kind], tmp_path)
-    for frame in film.frames:
+    for frame in film.states:
         mesh = meshio.read(tmp_path / f"frame-{frame.step:04d}.{kind}")
         assert mesh.points == pytest.approx(frame.positions, abs=1e-12)
         assert np.array_equal(mesh.cells_dict["triangle"], film.problem.elements)
@@ -107,7 +107,7 @@ def test_meshes_read_back(film, kind, tmp_path):
 def test_vtu_carries_stretches_and_violation(film, tmp_path):
     write_film(film, ["vtu"], tmp_path)
     mesh = meshio.read(tmp_path / "frame-0005.vtu")
-    x = film.frames[-1].positions
+    x = film.states[-1].positions
     data = {name: values[0] for name, values in mesh.cell_data.items()}
     stretches = principal_stretches(film.problem, x)
     assert data["principal_stretch_1"] == pytest.approx(stretches[:, 0])
@@ -120,7 +120,7 @@ def test_the_collection_gives_every_file_its_time(film, tmp_path):
     write_film(film, ["vtu"], tmp_path)
     entries = list(ET.parse(tmp_path / "frames.pvd").iter("DataSet"))
     assert [float(e.get("timestep")) for e in entries] == pytest.approx(
-        [f.time for f in film.frames]
+        [f.time for f in film.states]
     )
     assert all((tmp_path / e.get("file")).exists() for e in entries)
 
@@ -139,7 +139,7 @@ def test_of_tetrahedra_the_outer_faces_are_seen(tmp_path):
     assert [1, 2, 3] not in np.sort(faces).tolist()
     for face, element in zip(faces, owner, strict=True):
         assert set(face) <= set(problem.elements[element])
-    film = Film("two", "none", problem, [Frame(0, None, problem.target)], None)
+    film = Film("two", "none", problem, [State(0, None, problem.target)], None)
     write_film(film, ["png", "ply", "vtu"], tmp_path)
     assert len(meshio.read(tmp_path / "frame-0000.ply").cells_dict["triangle"]) == 6
     volume = meshio.read(tmp_path / "frame-0000.vtu")
@@ -196,7 +196,7 @@ def test_an_ffmpeg_that_fails_is_one_line(film, tmp_path, monkeypatch):
 def test_scale_and_camera_stay_the_same_over_a_film(film):
     picture = Picture(film)
     before = picture.norm.vmin, picture.norm.vmax, picture.ax.get_xlim(), picture.ax.get_ylim()
-    images = [picture.draw(k) for k in range(len(film.frames))]
+    images = [picture.draw(k) for k in range(len(film.states))]
     after = picture.norm.vmin, picture.norm.vmax, picture.ax.get_xlim(), picture.ax.get_ylim()
     assert before == after
     bars = [image[:, int(0.84 * PIXELS[0]) :] for image in images]  # colour bar and its labels
@@ -214,7 +214,7 @@ def test_the_scale_holds_the_limits_and_what_is_seen(film):
 def test_every_frame_lies_within_the_picture(film):
     picture = Picture(film, Camera(-50, 70))
     low, high = np.transpose([picture.ax.get_xlim(), picture.ax.get_ylim()])
-    for frame in film.frames:
+    for frame in film.states:
         seen = picture.camera.view(frame.positions)[:, :2]
         assert np.all((low < seen) & (seen < high))
 
@@ -278,7 +278,7 @@ def test_polar_plots(suffix, tmp_path):
 
 def test_a_polar_plot_cuts_nothing_off(film):
     named = Film(film.scene, "gauss-seidel[" + 9 * "max_sweeps=50," + "]", *vars_of(film))
-    torn = Film(film.scene, "none", film.problem, [Frame(5, 0.1, 3 * film.problem.target)], None)
+    torn = Film(film.scene, "none", film.problem, [State(5, 0.1, 3 * film.problem.target)], None)
     figure = draw_polar([film, named, torn])
     assert "beyond the axis" in " ".join(t.get_text() for t in figure.legends[0].get_texts())
     box = figure.get_tightbbox(FigureCanvasAgg(figure).get_renderer())

@@ -12,7 +12,7 @@ from strainbench import Solution, Solver
 from strainbench.bench.plan import plan_one
 from strainbench.bench.recording import record, record_all, recorded, recorder
 from strainbench.solver.registry import find_solver
-from strainbench.studies.duel.measure import Entry, duel, parse_frames
+from strainbench.studies.duel.measure import Racer, duel, parse_frames
 from strainbench.studies.duel.report import CSV_HEADER, HEADER, Outcome, check_ending
 from tests.cli.test_cli import strainbench
 
@@ -131,9 +131,9 @@ def outcome(*entries):
 
 def test_ratios_and_units():
     found = outcome(
-        Entry("first", [0.5, 0.7, 0.6], [6.0, 2.0, 4.0]),
-        Entry("second", [0.1], [8.0]),
-        Entry("factorisation + solve (superlu)", seconds=[0.5]),
+        Racer("first", [0.5, 0.7, 0.6], [6.0, 2.0, 4.0]),
+        Racer("second", [0.1], [8.0]),
+        Racer("factorisation + solve (superlu)", seconds=[0.5]),
     )
     first, second, unit = found.rows()
     assert (first["setup_seconds"], first["seconds"]) == pytest.approx((0.6, 4.0))
@@ -148,7 +148,7 @@ def test_ratios_and_units():
 
 
 def test_no_columns_for_units_that_were_not_measured():
-    header = outcome(Entry("only", [1.0], [1.0])).lines()[0]
+    header = outcome(Racer("only", [1.0], [1.0])).lines()[0]
     assert not [name for name in header if name.startswith("/")]
 
 

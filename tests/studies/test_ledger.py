@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from strainbench.bench.plan import plan
-from strainbench.studies.ledger import AS_IT_IS, PARTS, Run, compared, ledger, write_ledger
+from strainbench.solver.registry import find_solver
+from strainbench.studies.ledger.measure import (
+    AS_IT_IS,
+    PARTS,
+    Added,
+    Run,
+    account,
+    compared,
+)
+from strainbench.studies.ledger.report import write_ledger
 
 
 def cells(scene, *settings, steps=6, tolerance=1e-6):
@@ -15,7 +24,7 @@ def cells(scene, *settings, steps=6, tolerance=1e-6):
 
 
 def rows(scene, *settings, **options):
-    return {row.change: row for row in ledger(*cells(scene, *settings, **options))}
+    return {row.change: row for row in account(*cells(scene, *settings, **options))}
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +90,6 @@ def test_a_twist_is_compared_while_it_has_an_answer():
 
 def test_inertia_added_to_a_scene_without_physics_is_the_velocity_of_its_answers():
     from scenarios.twist import Twist
-    from strainbench.studies.ledger import Added
 
     scene = Twist(resolution=3, step=0.1)
     added = Added(scene, "inertia")
@@ -129,3 +137,11 @@ def test_a_solver_that_fails_is_a_note():
     run = Run(scene, Raise(), 1e-6).play(3)
     assert run.note == "no answer in step 1: ZeroDivisionError: by a solver"
     assert compared(AS_IT_IS, run, run).distance_mm is None
+
+
+def test_a_scene_that_ends_is_another_note():
+    from tests.scenario.test_stage import Twice
+
+    run = Run(Twice(resolution=3), find_solver("none"), 1e-6).play(5)
+    assert run.note == "the scene ended in step 3: the scene has no more steps"
+    assert len(run.positions) == 2

@@ -33,7 +33,7 @@ from strainbench.problem.export import write_problem
 from strainbench.problem.problem import Problem
 from strainbench.referee.certificate import certify
 from strainbench.referee.reference import content_key, reference_of
-from strainbench.studies.convergence.trace import trace
+from strainbench.studies.convergence.trace import trace_cell
 
 CONVERGENCE = "convergence.csv"
 MEASURES = ("max_violation", "relative_gap", "distance")
@@ -63,7 +63,7 @@ POLL_SECONDS = 0.02
 Rows = list[dict[str, object]]
 
 
-class Frame:
+class Judged:
     """One problem, and the referee's measures of answers to it.
 
     Parameters
@@ -120,10 +120,10 @@ def _converge(
     check_folder(folder, problem)
     machine, about = describe_machine(threads=1)
     remember_machine(folder, machine, about)
-    frame = Frame(problem, cells[0].scenario.label, number)
-    facts = frame.facts | {"machine": machine}
+    judged = Judged(problem, cells[0].scenario.label, number)
+    facts = judged.facts | {"machine": machine}
     start = {"solver": CANDIDATE, "seconds": 0.0, "iterations": 0}
-    keep(folder, [facts | start | frame.measures(problem.target)])
+    keep(folder, [facts | start | judged.measures(problem.target)])
     with TemporaryDirectory() as scratch, fixed_threads(1):
         path = Path(scratch) / "frame.npz"
         write_problem(problem, path, "npz", cells[0].scenario.label)
@@ -134,7 +134,7 @@ def _converge(
             item = None
             if not cell.solver.unavailable:
                 item = run_alone(cell, Path(scratch) / str(k), path, memory_limit_mb)
-            rows = samples(frame, cell, item)
+            rows = samples(judged, cell, item)
             keep(folder, [facts | row for row in rows])
             yield cell, str(rows[-1]["ending"])
 
@@ -159,7 +159,7 @@ def keep(folder: Path, rows: Rows) -> None:
 def run_alone(cell: Cell, folder: Path, frame: Path, memory_limit_mb: float) -> Running:
     """Run a cell in a process of its own, to its end."""
     with family() as ours:
-        item = Running.start(ours, cell, folder, frame, memory_limit_mb, trace)
+        item = Running.start(ours, cell, folder, frame, memory_limit_mb, trace_cell)
         while not item.has_ended():
             if item.is_ready():
                 item.release()
@@ -167,7 +167,7 @@ def run_alone(cell: Cell, folder: Path, frame: Path, memory_limit_mb: float) -> 
     return item
 
 
-def samples(frame: Frame, cell: Cell, item: Running | None) -> Rows:
+def samples(judged: Judged, cell: Cell, item: Running | None) -> Rows:
     """A cell's rows; a single one without measures where it kept nothing."""
     events = read_events(item.folder) if item else []
     by_name = {e["event"]: e for e in events}
@@ -178,16 +178,16 @@ def samples(frame: Frame, cell: Cell, item: Running | None) -> Rows:
         "ending": _ending(cell, item, by_name),
         "time_limit": "" if cell.time_limit is None else cell.time_limit,
     }
-    return [same | sample for sample in _measured(frame, item, events)] if item else [same]
+    return [same | sample for sample in _measured(judged, item, events)] if item else [same]
 
 
-def _measured(frame: Frame, item: Running, events: list[dict[str, Any]]) -> Rows:
+def _measured(judged: Judged, item: Running, events: list[dict[str, Any]]) -> Rows:
     """All answers, or the last run's iterates and answer; one that says nothing without any."""
     kept = [e for e in events if e["event"] in ("iterate", "answer")]
     runs = [e["tolerance"] for e in kept if e["event"] == "iterate"]
     answers = read_frames(item.folder, len(kept))
     rows: Rows = [
-        {k: v for k, v in event.items() if k in COLUMNS} | frame.measures(positions)
+        {k: v for k, v in event.items() if k in COLUMNS} | judged.measures(positions)
         for event, (_, positions) in zip(kept, answers, strict=True)
         if not runs or event["tolerance"] == runs[-1]
     ]

@@ -20,9 +20,10 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import Journal
-from strainbench.bench.play import Stop, start_warming, wait_for_go, what_it_says, with_journal
+from strainbench.bench.play import Stop, start_warming, wait_for_go, with_journal
 from strainbench.problem.export import load_problem
 from strainbench.problem.problem import Problem
+from strainbench.scenario.stage import plain_solution
 from strainbench.solver.solver import Solution, run_solver, warm_up
 
 LOOSEST = 1e2
@@ -32,7 +33,7 @@ ALL = 20  # iterates are kept one by one up to this many,
 GROWTH = 1.1  # and from there on where their count has grown by this
 
 
-def trace(cell: Cell, folder: Path, frame: Path | None) -> None:
+def trace_cell(cell: Cell, folder: Path, frame: Path | None) -> None:
     """Run `cell`'s solver on the exported problem at `frame`, writing to `folder`."""
     assert frame is not None
     problem = load_problem(frame)
@@ -94,10 +95,8 @@ class Keeper:
 
     def answer(self, solution: Solution) -> None:
         """What the run came back with."""
-        said = what_it_says(solution)
-        self._write(
-            "answer", solution.seconds, said["iterations"], solution.positions, said["status"]
-        )
+        said = plain_solution(solution)
+        self._write("answer", said.seconds, said.iterations, said.positions, said.status)
 
     def _write(
         self, event: str, seconds: float, iterations: int, positions: FloatArray, status: str

@@ -38,7 +38,7 @@ FACTORISATION, IMPLICIT_EULER = "factorisation + solve", "implicit Euler step"
 
 
 @dataclass
-class Entry:
+class Racer:
     """A solver, or a unit of time, and what was measured of it.
 
     Parameters
@@ -122,7 +122,7 @@ def duel(
     time_limit: float | None = None,
     units: bool = False,
     progress: Callable[[], None] = lambda: None,
-) -> list[Entry]:
+) -> list[Racer]:
     """Measure all solvers; with `units` the units follow them.
 
     Parameters
@@ -140,7 +140,7 @@ def duel(
     for solver in solvers:
         if refusal := solver.supports(problem):
             raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
-    entries = [Entry(solver.label) for solver in solvers]
+    entries = [Racer(solver.label) for solver in solvers]
     with fixed_threads(1), threadpool_limits(1):
         for solver in solvers:
             warm_up(solver, problem, tolerance)
@@ -160,7 +160,7 @@ def duel(
                         unit.take_turn()
     judge(entries, recording)  # 4
     if unit:
-        entries += [unit.entry, Entry(IMPLICIT_EULER, seconds=list(recording.step_seconds))]
+        entries += [unit.entry, Racer(IMPLICIT_EULER, seconds=list(recording.step_seconds))]
     return entries
 
 
@@ -170,14 +170,14 @@ def rotated(items: Sequence[Any], by: int) -> Iterator[Any]:
         yield items[(k + by) % len(items)]
 
 
-def _prepared(solver: Solver, problem: Problem, entry: Entry) -> Any:
+def _prepared(solver: Solver, problem: Problem, entry: Racer) -> Any:
     begin = perf_counter()
     state = solver.prepare(problem)
     entry.setups.append(perf_counter() - begin)
     return state
 
 
-def judge(entries: Sequence[Entry], recording: Recording) -> None:
+def judge(entries: Sequence[Racer], recording: Recording) -> None:
     """Certify the answers."""
     referee = ReferenceSolver(recording.problem)
     for number in sorted(set().union(*(e.answers for e in entries))):
@@ -199,7 +199,7 @@ class Factorisation:
         degree = 2.0 * float(np.diff(pattern.indptr).max())  # diagonally dominant
         pattern.add_diagonal(self._data, np.full(problem.vertices, degree))
         self._b: FloatArray = np.ones(pattern.size)
-        self.entry = Entry(f"{FACTORISATION} ({self._linear.name})")
+        self.entry = Racer(f"{FACTORISATION} ({self._linear.name})")
 
     def take_turn(self) -> None:
         """Time it once."""

@@ -14,7 +14,7 @@ from rich.table import Table
 from strainbench import escape
 from strainbench.bench.records import open_folder
 from strainbench.report.table import machine_line, power
-from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER, Entry
+from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER, Racer
 
 EXPLANATION = (
     "One process, one thread; the methods take turns on each frame. Seconds are the median of all "
@@ -68,7 +68,7 @@ class Outcome:
     title: str
     command: str
     machines: Mapping[str, Mapping[str, object]]
-    entries: Sequence[Entry]
+    entries: Sequence[Racer]
 
     def rows(self) -> Iterator[dict[str, object]]:
         """One an entry, by the columns of CSV_HEADER; NaN where there is nothing."""

@@ -14,47 +14,28 @@ candidate that it proposes, with the constants of `Material`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
-import pandas as pd
 
-from strainbench import escape
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
-from strainbench.bench.machine import describe_machine
-from strainbench.bench.records import open_folder, remember_machine
-from strainbench.files import locked, write_whole
 from strainbench.physics.body import gravity_of
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.contact import Contact, Floor
 from strainbench.physics.implicit_euler import NewtonSettings, minimise_step
 from strainbench.referee.reference import reference_of
-from strainbench.render.film import Track, untracked
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.scenario import Scenario, SheetScenario
-from strainbench.solver.solver import Solver, run_solver
+from strainbench.scenario.stage import Stage, StageError, Who
+from strainbench.solver.solver import Solver
 
 PARTS = ("inertia", "gravity", "membrane", "bending", "contact", "wind")
 CONTROL = 0.01  # of the tolerance
 FLOOR = Contact(10.0, 5e-3, (Floor(-1.0),))
 """Below the reach of all sheets of our scenes: half a metre and their limit from y = 0."""
 AS_IT_IS = "as it is"
-MODELS = (
-    "scene, needs, cells, variables, constraints, active, non-zeros of the constraints, "
-    "of the energy's Hessian, Newton iterations"
-)
-EFFECTS = (
-    "scene, change, farthest vertex [mm], in edge lengths, energy [mJ], active, "
-    "Hessian's non-zeros, Newton iterations, after step, "
-)
-EXPLANATION = (
-    "How far the farthest vertex is from where it is in the scene as it is, and how much more "
-    "energy the scene's own parts count (so a part left out is counted in both). Changes no larger "
-    "than that of a hundredth of the solver's tolerance say nothing."
-)
 MEANINGLESS = {
     "inertia": "no time passes in it",
     "contact": "its method knows no contact",
@@ -84,7 +65,7 @@ class Row:
     note: str = ""
 
 
-def ledger(cell: Cell) -> Iterator[Row]:
+def account(cell: Cell) -> Iterator[Row]:
     """The rows of a cell's scene, as they are measured."""
     scene, solver = cell.scenario.scenario(), cell.solver.solver()
     base = Run(scene, solver, cell.tolerance).play(cell.steps)
@@ -151,21 +132,14 @@ class Added:
         self.before = x
 
 
-class NoAnswer(Exception):  # noqa: N818
-    """Ends a run early, with what the solver says."""
-
-
 class Run:
     """A scene played with one solver: positions, kinetic energies, what Newton's method did."""
 
     def __init__(
         self, scene: Scenario, solver: Solver, tolerance: float, added: Added | None = None
     ) -> None:
-        self.scene, self.solver, self.tolerance, self.added = scene, solver, tolerance, added
-        self.problem = self.last = scene.problem()
-        if refusal := solver.supports(self.problem):
-            raise ValueError(f"{solver.label} cannot take {scene.name}: {refusal}")
-        self.state = solver.prepare(self.problem)
+        self.scene, self.added = scene, added
+        self.stage = Stage.opened(scene, solver, tolerance)
         self.positions: list[FloatArray] = []
         self.kinetic: list[float] = []
         self.iterations, self.failures = 0, 0
@@ -173,33 +147,23 @@ class Run:
 
     def play(self, steps: int) -> Run:
         """So many steps, or as many as have an answer; the run itself."""
-        playing = self.scene.play(self._project)
-        for k in range(1, steps + 1):
-            try:
-                report = next(playing)
-            except NoAnswer as answer:
-                self.note = f"no answer in step {k}: {answer}"
-                break
-            self.positions.append(self._answer)
-            self.kinetic.append(report.kinetic_energy)
-            self.iterations += report.newton_iterations
-            self.failures += not report.newton_converged
+        try:
+            for report in self.stage.steps(steps, self._project):
+                self.positions.append(self.stage.positions)
+                self.kinetic.append(report.kinetic_energy)
+                self.iterations += report.newton_iterations
+                self.failures += not report.newton_converged
+        except StageError as error:  # a failing solver is data here too
+            ended = "no answer" if error.who is Who.SOLVER else f"{error.who} ended"
+            self.note = f"{ended} in step {self.stage.step}: {error}"
         return self
 
     def _project(self, target: FloatArray) -> FloatArray:
-        if self.added:
-            target = self.added.candidate(target)
-        problem = self.problem.with_target(target)
-        try:
-            solution = run_solver(self.solver, problem, self.state, self.tolerance)
-        except Exception as error:  # a failing solver is data here too
-            raise NoAnswer(f"{type(error).__name__}: {error}") from error
-        if not np.all(np.isfinite(solution.positions)):
-            raise NoAnswer(str(solution.status))
-        if self.added:
-            self.added.keep(solution.positions)
-        self.last, self._answer = problem, solution.positions
-        return solution.positions
+        if self.added is None:
+            return self.stage.project(target)
+        answer = self.stage.project(self.added.candidate(target))
+        self.added.keep(answer)
+        return answer
 
     @property
     def cloth(self) -> Cloth | None:
@@ -226,7 +190,7 @@ def empty(scene: Scenario, change: str) -> Row:
 
 def compared(change: str, run: Run, base: Run) -> Row:
     """The row of a run."""
-    problem, cloth, added = run.problem, run.cloth, run.added
+    problem, cloth, added = run.stage.problem, run.cloth, run.added
     row = replace(
         empty(base.scene, change),
         variables=3 * len(problem.free),
@@ -245,79 +209,9 @@ def compared(change: str, run: Run, base: Run) -> Row:
     mine, reference = (energy(r, base, steps - 1) for r in (run, base))
     return replace(
         row,
-        active=reference_of(run.last).active_constraints,
+        active=reference_of(run.stage.frame).active_constraints,
         compared_after=steps,
         distance_mm=1000 * distance,
         distance_edges=distance / problem.edge_length,
         energy_mj=1000 * (mine - reference) if mine is not None and reference is not None else None,
     )
-
-
-def write_ledger(cells: Sequence[Cell], folder: Path, track: Track = untracked) -> list[Path]:
-    """The ledger of the scenes of `cells`: ledger.csv, ledger.md and machines.json.
-
-    Raises
-    ------
-    ValueError
-        In one line: a solver that is unavailable or does not take a scene.
-    """
-    open_folder(folder)
-    for cell in cells:
-        if cell.solver.unavailable:
-            raise ValueError(cell.solver.unavailable)
-    plays = (row for cell in cells for row in ledger(cell))
-    name, facts = describe_machine(1)
-    first = cells[0]
-    about = f"{first.steps} steps, {first.solver.label}, tolerance {first.tolerance:g}; {name}."
-    paths = [folder / "ledger.csv", folder / "ledger.md"]
-    with locked(folder):
-        rows = list(track(plays, "playing", len(cells) * (2 + len(PARTS))))
-        remember_machine(folder, name, facts)
-        table = pd.DataFrame([asdict(row) for row in rows]).convert_dtypes()
-        write_whole(paths[0], table.map(escape.cell).to_csv(index=False).encode())
-        write_whole(paths[1], as_markdown(rows, about).encode())
-    return paths
-
-
-def as_markdown(rows: list[Row], about: str) -> str:
-    """What each scene models, then what each part changes."""
-    models = [
-        (r.scene, r.needs, r.cells, r.variables, r.constraints, r.active, *_sparsity(r))
-        for r in rows
-        if r.change == AS_IT_IS
-    ]
-    effects = [
-        (r.scene, r.change, r.distance_mm, r.distance_edges, r.energy_mj, *_effort(r))
-        for r in rows
-        if r.change != AS_IT_IS
-    ]
-    parts = ["# Model ledger", escape.markdown(about), _table(MODELS, models)]
-    parts += ["## What each part changes", EXPLANATION, _table(EFFECTS, effects)]
-    return "\n\n".join(parts) + "\n"
-
-
-def _sparsity(row: Row) -> tuple[int | None, int | None, int | None]:
-    return row.nonzeros, row.hessian_nonzeros, row.newton_iterations
-
-
-def _effort(row: Row) -> tuple[object, ...]:
-    failures = f"; Newton fails on {row.newton_failures} steps" if row.newton_failures else ""
-    return (
-        row.active,
-        row.hessian_nonzeros,
-        row.newton_iterations,
-        row.compared_after,
-        (row.note + failures).removeprefix("; "),
-    )
-
-
-def _table(header: str, rows: Sequence[tuple[object, ...]]) -> str:
-    lines = [header.split(", "), ["---"] * (header.count(", ") + 1)]
-    lines += [[_text(value) for value in row] for row in rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _text(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.2g}" if isinstance(value, float) else escape.markdown(value)

@@ -1,0 +1,3 @@
+"""What each part of a scene's physics changes in the answer."""
+
+from strainbench.studies.ledger.report import write_ledger as write_ledger

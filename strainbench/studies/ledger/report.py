@@ -1,0 +1,101 @@
+"""The ledger's rows as CSV and as Markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+import pandas as pd
+
+from strainbench import escape
+from strainbench.bench.cell import Cell
+from strainbench.bench.machine import describe_machine
+from strainbench.bench.records import open_folder, remember_machine
+from strainbench.files import locked, write_whole
+from strainbench.render.film import Track, untracked
+from strainbench.studies.ledger.measure import AS_IT_IS, PARTS, Row, account
+
+MODELS = (
+    "scene, needs, cells, variables, constraints, active, non-zeros of the constraints, "
+    "of the energy's Hessian, Newton iterations"
+)
+EFFECTS = (
+    "scene, change, farthest vertex [mm], in edge lengths, energy [mJ], active, "
+    "Hessian's non-zeros, Newton iterations, after step, "
+)
+EXPLANATION = (
+    "How far the farthest vertex is from where it is in the scene as it is, and how much more "
+    "energy the scene's own parts count (so a part left out is counted in both). Changes no larger "
+    "than that of a hundredth of the solver's tolerance say nothing."
+)
+
+
+def write_ledger(cells: Sequence[Cell], folder: Path, track: Track = untracked) -> list[Path]:
+    """The ledger of the scenes of `cells`: ledger.csv, ledger.md and machines.json.
+
+    Raises
+    ------
+    ValueError
+        In one line: a solver that is unavailable or does not take a scene.
+    """
+    open_folder(folder)
+    for cell in cells:
+        if cell.solver.unavailable:
+            raise ValueError(cell.solver.unavailable)
+    plays = (row for cell in cells for row in account(cell))
+    name, facts = describe_machine(1)
+    first = cells[0]
+    about = f"{first.steps} steps, {first.solver.label}, tolerance {first.tolerance:g}; {name}."
+    paths = [folder / "ledger.csv", folder / "ledger.md"]
+    with locked(folder):
+        rows = list(track(plays, "playing", len(cells) * (2 + len(PARTS))))
+        remember_machine(folder, name, facts)
+        table = pd.DataFrame([asdict(row) for row in rows]).convert_dtypes()
+        write_whole(paths[0], table.map(escape.cell).to_csv(index=False).encode())
+        write_whole(paths[1], as_markdown(rows, about).encode())
+    return paths
+
+
+def as_markdown(rows: list[Row], about: str) -> str:
+    """What each scene models, then what each part changes."""
+    models = [
+        (r.scene, r.needs, r.cells, r.variables, r.constraints, r.active, *_sparsity(r))
+        for r in rows
+        if r.change == AS_IT_IS
+    ]
+    effects = [
+        (r.scene, r.change, r.distance_mm, r.distance_edges, r.energy_mj, *_effort(r))
+        for r in rows
+        if r.change != AS_IT_IS
+    ]
+    parts = ["# Model ledger", escape.markdown(about), _table(MODELS, models)]
+    parts += ["## What each part changes", EXPLANATION, _table(EFFECTS, effects)]
+    return "\n\n".join(parts) + "\n"
+
+
+def _sparsity(row: Row) -> tuple[int | None, int | None, int | None]:
+    return row.nonzeros, row.hessian_nonzeros, row.newton_iterations
+
+
+def _effort(row: Row) -> tuple[object, ...]:
+    failures = f"; Newton fails on {row.newton_failures} steps" if row.newton_failures else ""
+    return (
+        row.active,
+        row.hessian_nonzeros,
+        row.newton_iterations,
+        row.compared_after,
+        (row.note + failures).removeprefix("; "),
+    )
+
+
+def _table(header: str, rows: Sequence[tuple[object, ...]]) -> str:
+    lines = [header.split(", "), ["---"] * (header.count(", ") + 1)]
+    lines += [[_text(value) for value in row] for row in rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _text(value: object) -> str:
+    if value is None:
+        return ""
+    return f"{value:.2g}" if isinstance(value, float) else escape.markdown(value)
