@@ -18,8 +18,9 @@ from strainbench.bench.settings import Choices, blaming, combinations, is_file, 
 from strainbench.fields import default_of
 from strainbench.options import MOST, shown
 from strainbench.plugins import UnavailableError
+from strainbench.progress import SceneWarning
 from strainbench.scenario.registry import find_scenario, scenarios_of
-from strainbench.scenario.scenario import Scenario, SceneWarning
+from strainbench.scenario.scenario import Scenario
 from strainbench.solver.registry import find_solver, list_solvers, solvers_of
 from strainbench.solver.solver import Solver, warm_twin
 

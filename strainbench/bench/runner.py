@@ -39,6 +39,7 @@ from strainbench.bench.process import Child, Family, family
 from strainbench.bench.recording import recorder
 from strainbench.bench.records import latest_runs, mend, open_folder, remember_machine, write_cell
 from strainbench.files import locked, uninterrupted
+from strainbench.progress import Observer as Observer
 from strainbench.referee.reference import REFERENCE_SOLVER
 
 POLL_SECONDS = 0.02
@@ -61,25 +62,6 @@ class Settings:
     jobs: int = 1
     memory_limit_mb: float = 8192.0
     rerun: bool = False
-
-
-class Observer:
-    """What a progress display may listen to."""
-
-    def planned(self, cells: Sequence[Cell], skipped: int) -> None:
-        """These cells will run, and so many had finished before."""
-
-    def started(self, cell: Cell) -> None:
-        """A cell's process was started."""
-
-    def stepped(self, cell: Cell, steps: int) -> None:
-        """A running cell has done so many steps."""
-
-    def ended(self, cell: Cell, row: dict[str, object]) -> None:
-        """A cell's row was written."""
-
-    def waiting(self, what: str) -> None:
-        """Nothing goes on until this comes."""
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -16,9 +16,9 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from strainbench.bench.cell import Cell
-from strainbench.bench.runner import Observer, Summary
+from strainbench.bench.runner import Summary
 from strainbench.escape import plain, terminal
+from strainbench.progress import Observer, Work
 
 console = Console()
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -62,24 +62,24 @@ class Display(Observer):
     def __exit__(self, *_: object) -> None:
         self.progress.stop()
 
-    def planned(self, cells: Sequence[Cell], skipped: int) -> None:
+    def planned(self, cells: Sequence[Work], skipped: int) -> None:
         """See the base class."""
         self.finished = skipped
         if skipped:
             say(f"{skipped} cells finished before; --rerun runs them again")
         self.progress.update(self.task, total=sum(c.steps for c in cells))
 
-    def started(self, cell: Cell) -> None:
+    def started(self, cell: Work) -> None:
         """See the base class."""
         self.running[cell.title] = 0
         self._show()
 
-    def stepped(self, cell: Cell, steps: int) -> None:
+    def stepped(self, cell: Work, steps: int) -> None:
         """See the base class."""
         self.running[cell.title] = steps
         self._show()
 
-    def ended(self, cell: Cell, row: dict[str, object]) -> None:
+    def ended(self, cell: Work, row: Mapping[str, object]) -> None:
         """See the base class."""
         self.running.pop(cell.title, None)
         self.done += cell.steps

@@ -31,8 +31,8 @@ from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.contact import Contact, Floor
 from strainbench.physics.implicit_euler import GRAVITY, NewtonSettings, minimise_step
 from strainbench.physics.statics import potential
+from strainbench.progress import Track, untracked
 from strainbench.referee.reference import reference_of
-from strainbench.render.film import Track, untracked
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.scenario import Scenario, SheetScenario
 from strainbench.solver.solver import Solver, run_solver
