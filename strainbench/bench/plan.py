@@ -242,10 +242,15 @@ def plan_scene(
 
 
 def plan_available(
-    scenario: str, solvers: str, settings: Sequence[str], steps: int, tolerance: float
+    scenario: str,
+    solvers: Sequence[str],
+    settings: Sequence[str],
+    steps: int,
+    tolerance: float,
+    time_limit: float | None = None,
 ) -> list[Cell]:
     """The same; ValueError for an unavailable solver, with the reason."""
-    cells = plan_scene(scenario, [solvers], settings, steps, tolerance)
+    cells = plan_scene(scenario, solvers, settings, steps, tolerance, time_limit)
     for cell in cells:
         if cell.solver.unavailable:
             raise ValueError(cell.solver.unavailable)
@@ -256,7 +261,7 @@ def plan_one(
     scenario: str, solver: str, settings: Sequence[str], steps: int, tolerance: float
 ) -> Cell:
     """The same with a single solver; ValueError names those that the words give."""
-    cells = plan_available(scenario, solver, settings, steps, tolerance)
+    cells = plan_available(scenario, [solver], settings, steps, tolerance)
     if len(cells) > 1:
         labels = ", ".join(cell.solver.label for cell in cells)
         raise ValueError(f"--solver and --set give {len(cells)} solvers ({labels}): one is valid")
