@@ -26,7 +26,6 @@ from typing import Any
 from strainbench.bench.cell import Cell
 from strainbench.bench.columns import STEP_COLUMNS
 from strainbench.bench.ending import Ending
-from strainbench.bench.judge import identity
 from strainbench.bench.process import OUTPUT
 from strainbench.bench.records import (
     STEPS,
@@ -36,6 +35,7 @@ from strainbench.bench.records import (
     remember_machine,
     write_cell,
 )
+from strainbench.bench.rows import identity
 from strainbench.bench.runner import Runner, Settings
 from strainbench.files import locked
 from strainbench.plugins import told
