@@ -169,3 +169,15 @@ def _sync(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def content_of(path: Path, start: int = 0) -> bytes:
+    """What a file holds from a byte on; nothing where there is none."""
+    try:
+        with path.open("rb") as file:
+            file.seek(start)
+            return file.read()
+    except (FileNotFoundError, NotADirectoryError):
+        return b""
+    except OSError as error:
+        raise RecordsError(f"{path} cannot be read ({error.strerror})") from None

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import os
 import re
 import shutil
@@ -11,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+import strainbench
 from tests.imports import HERE, OURS, Graph, files, layers, report
 
 
@@ -50,6 +53,22 @@ def test_an_import_upwards_a_circle_and_a_new_room_are_found(copy):
     drawn = run(HERE, sys.executable, "-m", "tests.imports", str(copy)).stdout
     assert re.search(r"^circle: .*\bcli\b", drawn, re.MULTILINE)
     assert f"upward: {low.stem} imports cli" in drawn
+
+
+def test_the_face_offers_what_it_says_from_where_it_is():
+    imports = ast.walk(ast.parse((HERE / "strainbench/__init__.py").read_text()))
+    homes = {
+        node.module: tuple(alias.name for alias in node.names)
+        for node in imports
+        if isinstance(node, ast.ImportFrom) and node.module.startswith("strainbench.")
+    }
+    assert homes == {f"strainbench.{home}": names for home, names in strainbench._HOMES.items()}
+    assert sorted(name for names in homes.values() for name in names) == strainbench.__all__
+    for home, names in homes.items():
+        for name in names:
+            assert getattr(strainbench, name) is getattr(importlib.import_module(home), name)
+    with pytest.raises(AttributeError, match="no attribute 'nowhere'"):
+        strainbench.nowhere  # noqa: B018
 
 
 def test_floors_circles_and_arrows_upwards():

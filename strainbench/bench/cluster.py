@@ -26,7 +26,6 @@ from typing import Any
 from strainbench.bench.cell import Cell
 from strainbench.bench.columns import STEP_COLUMNS
 from strainbench.bench.ending import Ending
-from strainbench.bench.judge import identity
 from strainbench.bench.process import OUTPUT
 from strainbench.bench.records import (
     STEPS,
@@ -36,9 +35,11 @@ from strainbench.bench.records import (
     remember_machine,
     write_cell,
 )
-from strainbench.bench.runner import Observer, Runner, Settings
+from strainbench.bench.rows import identity
+from strainbench.bench.runner import Runner, Settings
 from strainbench.files import locked
 from strainbench.plugins import told
+from strainbench.progress import Observer
 
 Results = tuple[list[dict[str, str]], list[dict[str, str]], dict[str, dict[str, object]]]
 """Rows of runs.csv, rows of steps.csv, machines."""
@@ -83,7 +84,7 @@ def run_on_cluster(
                 home.write(cell, identity(cell) | row, [])
             else:
                 _keep(settings.folder, future.result())
-                observer.ended(cell, dict(future.result()[0][0]))
+                observer.ended(cell, future.result()[0][0])
     return len(wanted)
 
 

@@ -21,6 +21,7 @@ from strainbench.scenario.scenario import StepReport
 
 EVENTS, FRAMES, TARGETS, GO = "events.jsonl", "frames.bin", "targets.bin", "go"
 NUMBER = (int, float)
+Events = list[dict[str, Any]]
 FACTS: dict[str, dict[str, type | tuple[type, ...]]] = {
     "loaded": {
         "variables": int,
@@ -74,7 +75,7 @@ class Journal:
         self._frames.flush()
 
 
-def read_journal(folder: Path) -> tuple[list[dict[str, Any]], str]:
+def read_journal(folder: Path) -> tuple[Events, str]:
     """The events so far, and where the journal is damaged, or ""; nothing is read beyond that.
 
     A line torn by a killed process is left out.
@@ -82,7 +83,7 @@ def read_journal(folder: Path) -> tuple[list[dict[str, Any]], str]:
     path = folder / EVENTS
     if not path.exists():
         return [], ""
-    events: list[dict[str, Any]] = []
+    events: Events = []
     lines = path.read_text(encoding="utf-8", errors="replace").split("\n")[:-1]
     for number, line in enumerate(lines, start=1):
         try:
@@ -109,9 +110,14 @@ def _is_sound(event: Any) -> bool:
     )
 
 
-def read_events(folder: Path) -> list[dict[str, Any]]:
+def read_events(folder: Path) -> Events:
     """The events so far, those before any damage."""
     return read_journal(folder)[0]
+
+
+def only(events: Events, kind: str) -> Events:
+    """The events of one kind."""
+    return [e for e in events if e["event"] == kind]
 
 
 def read_frames(folder: Path, count: int) -> Iterator[tuple[FloatArray, FloatArray]]:
@@ -127,7 +133,7 @@ def keep_targets(recording: Path) -> None:
     """Leave the candidates alone in a recording: answers are nothing to feed a solver with."""
     if not (recording / FRAMES).exists():
         return
-    count = sum(e["event"] == "projection" for e in read_events(recording))
+    count = len(only(read_events(recording), "projection"))
     with (recording / TARGETS).open("wb") as file:
         for target, _ in read_frames(recording, count):
             np.save(file, target)

@@ -53,6 +53,11 @@ def describe_machine(threads: int) -> tuple[str, dict[str, object]]:
     return f"{model}, {facts['cores']} cores ({digest})", facts
 
 
+def memory_share(jobs: int = 1) -> float:
+    """[MB] that each of some cells may take by default: 3/4 of the machine's, shared."""
+    return float(0.75 * psutil.virtual_memory().total / 1024**2 / jobs)
+
+
 def _blas() -> list[str]:
     """The BLAS libraries that NumPy and SciPy have loaded, and the kernels that they chose."""
     pools = [pool for pool in threadpool_info() if pool["user_api"] == "blas"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, replace
 from itertools import product
 from math import isqrt
@@ -18,8 +18,9 @@ from strainbench.bench.settings import Choices, blaming, combinations, is_file, 
 from strainbench.fields import default_of
 from strainbench.options import MOST, shown
 from strainbench.plugins import UnavailableError
+from strainbench.progress import SceneWarning
 from strainbench.scenario.registry import find_scenario, scenarios_of
-from strainbench.scenario.scenario import Scenario, SceneWarning
+from strainbench.scenario.scenario import Scenario
 from strainbench.solver.registry import find_solver, list_solvers, solvers_of
 from strainbench.solver.solver import Solver, warm_twin
 
@@ -180,39 +181,48 @@ def plan(
     ValueError
         One line that names the wrong word and what is valid.
     """
-    if mode not in MODES:
-        raise ValueError(f"--mode {shown(mode)}: valid are {', '.join(MODES)}")
-    for name, count in (("--steps", steps), ("--threads", threads)):
-        if count is not None and count < 1:
-            raise ValueError(f"{name} {count}: a whole number above 0 is valid")
-    times = (("--time-limit", [time_limit]), ("--duration", [duration]))
-    for name, values in (("--tolerance", tolerances), *times):
-        for value in values:
-            if value is not None and not 0 < value < float("inf"):
-                raise ValueError(f"{name} {value}: a number above 0 is valid")
-    if not starts or not set(starts) <= set(STARTS):
-        raise ValueError(f"--start {shown(','.join(starts))}: valid are cold, warm and cold,warm")
+    _check_words(mode, starts)
+    _check_numbers({"--steps": [steps], "--threads": [threads]}, "a whole number")
+    times = {"--time-limit": [time_limit], "--duration": [duration]}
+    _check_numbers({"--tolerance": tolerances, **times}, "a number")
     choices = parse_settings(settings)
     scenes = plan_scenarios(scenarios, choices)
     methods = plan_solvers(solvers, choices, starts)
     if not methods:
         raise ValueError(f"--start warm: {', '.join(solvers)} cannot start from the frame before")
-    owners = {ref.name for ref in [*scenes, *methods]}
-    for owner in choices:
-        if owner and owner not in owners:
-            valid = ", ".join(sorted(owners))
-            raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
-    counts = [
-        steps_for(scene, duration) if duration is not None or steps is None else steps
+    _check_owners(choices, [*scenes, *methods])
+    counted = [
+        (scene, steps if steps and duration is None else steps_for(scene, duration))
         for scene in scenes
     ]
     cells = [
         Cell(scene, method, mode, count, tolerance, time_limit, threads)
-        for (scene, count), method, tolerance in product(
-            zip(scenes, counts, strict=True), methods, tolerances
-        )
+        for (scene, count), method, tolerance in product(counted, methods, tolerances)
     ]
     return list({cell.key: cell for cell in cells}.values())
+
+
+def _check_words(mode: str, starts: Sequence[str]) -> None:
+    if mode not in MODES:
+        raise ValueError(f"--mode {shown(mode)}: valid are {', '.join(MODES)}")
+    if not starts or not set(starts) <= set(STARTS):
+        raise ValueError(f"--start {shown(','.join(starts))}: valid are cold, warm and cold,warm")
+
+
+def _check_numbers(options: Mapping[str, Sequence[float | None]], what: str) -> None:
+    for name, values in options.items():
+        for value in values:
+            if value is not None and not 0 < value < float("inf"):
+                raise ValueError(f"{name} {value}: {what} above 0 is valid")
+
+
+def _check_owners(choices: Choices, refs: Sequence[PluginRef]) -> None:
+    """ValueError for settings of who is not in the run."""
+    owners = {ref.name for ref in refs}
+    for owner in choices:
+        if owner and owner not in owners:
+            valid = ", ".join(sorted(owners))
+            raise ValueError(f"--set {owner}.…: {owner!r} is not in this run; valid are {valid}")
 
 
 def plan_scene(
@@ -241,10 +251,15 @@ def plan_scene(
 
 
 def plan_available(
-    scenario: str, solvers: str, settings: Sequence[str], steps: int, tolerance: float
+    scenario: str,
+    solvers: Sequence[str],
+    settings: Sequence[str],
+    steps: int,
+    tolerance: float,
+    time_limit: float | None = None,
 ) -> list[Cell]:
     """The same; ValueError for an unavailable solver, with the reason."""
-    cells = plan_scene(scenario, [solvers], settings, steps, tolerance)
+    cells = plan_scene(scenario, solvers, settings, steps, tolerance, time_limit)
     for cell in cells:
         if cell.solver.unavailable:
             raise ValueError(cell.solver.unavailable)
@@ -255,7 +270,7 @@ def plan_one(
     scenario: str, solver: str, settings: Sequence[str], steps: int, tolerance: float
 ) -> Cell:
     """The same with a single solver; ValueError names those that the words give."""
-    cells = plan_available(scenario, solver, settings, steps, tolerance)
+    cells = plan_available(scenario, [solver], settings, steps, tolerance)
     if len(cells) > 1:
         labels = ", ".join(cell.solver.label for cell in cells)
         raise ValueError(f"--solver and --set give {len(cells)} solvers ({labels}): one is valid")

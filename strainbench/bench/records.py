@@ -17,21 +17,16 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
-from strainbench.bench.columns import (
-    COUNTS,
-    FACTS,
-    PROSE,
-    RUN_COLUMNS,
-    SETTINGS,
-    STEP_COLUMNS,
-    WORDS,
-)
+from strainbench.bench.columns import FACTS, PROSE, RUN_COLUMNS, STEP_COLUMNS, WORDS
+from strainbench.bench.faults import NO_HEADER, header_fault, record_fault, value_fault
+from strainbench.bench.faults import SCHEMA as SCHEMA
 from strainbench.escape import quoted, unquoted
 from strainbench.files import DiskError as DiskError
 from strainbench.files import RecordsError as RecordsError
 from strainbench.files import (
     append_whole,
     check_held,
+    content_of,
     cut,
     disk_errors,
     uninterrupted,
@@ -39,12 +34,9 @@ from strainbench.files import (
 )
 from strainbench.files import open_folder as open_folder
 
-SCHEMA = 2
 LONGEST_TEXT = 10_000  # characters of what is said in words
 RUNS, STEPS, MACHINES, PENDING = "runs.csv", "steps.csv", "machines.json", ".pending"
 
-FIRST = 4  # columns that every header has had
-NO_HEADER = f"it is no header of schema 1 to {SCHEMA}"
 REPAIR = "nothing was changed; mend or move the file, or give another --results"
 
 Row = dict[str, str]
@@ -76,13 +68,13 @@ def _parsed(path: Path, columns: Sequence[str]) -> tuple[list[Row], bytes]:
     if not content:
         return [], rest
     header, *records = csv.reader(io.StringIO(_decoded(path, content), newline=""))
-    if fault := _header_fault(header, records, columns):
+    if fault := header_fault(header, records, columns):
         raise RecordsError(f"{path}, {fault}; {REPAIR}")
     rows = []
     for number, record in enumerate(records, start=2):
-        fault = _record_fault(header, record)
+        fault = record_fault(header, record)
         row = dict.fromkeys(columns, "") | dict(zip(header, record, strict=False))
-        if fault := fault or _value_fault(row):
+        if fault := fault or value_fault(row):
             raise RecordsError(f"{path}, record {number}{fault}; {REPAIR}")
         rows.append({name: unquoted(v) if name in WORDS else v for name, v in row.items()})
     return rows, rest
@@ -90,22 +82,10 @@ def _parsed(path: Path, columns: Sequence[str]) -> tuple[list[Row], bytes]:
 
 def _finished(path: Path) -> tuple[bytes, bytes]:
     """The lines of a file that count, and an unfinished one at its end."""
-    content = _content(path)
+    content = content_of(path)
     content = content[: _unsettled(path.parent).get(path.name, len(content))]
     end = content.rfind(b"\n") + 1
     return content[:end], content[end:]
-
-
-def _content(path: Path, start: int = 0) -> bytes:
-    """What a file holds from a byte on; nothing where there is none."""
-    try:
-        with path.open("rb") as file:
-            file.seek(start)
-            return file.read()
-    except (FileNotFoundError, NotADirectoryError):
-        return b""
-    except OSError as error:
-        raise RecordsError(f"{path} cannot be read ({error.strerror})") from None
 
 
 def _decoded(path: Path, content: bytes) -> str:
@@ -114,84 +94,6 @@ def _decoded(path: Path, content: bytes) -> str:
     except UnicodeDecodeError as error:
         line = 1 + content[: error.start].count(b"\n")
         raise RecordsError(f"{path}, line {line}: not text in UTF-8; {REPAIR}") from None
-
-
-def _header_fault(
-    header: list[str], records: list[list[str]], columns: Sequence[str]
-) -> str | None:
-    """What is wrong with a header, or None: it has today's columns, or fewer of them."""
-    known = iter(columns)
-    if header[:FIRST] == list(columns[:FIRST]) and all(name in known for name in header):
-        return None
-    schemas = [r[0] for r in records if r and header[:1] == ["schema"]]
-    if newer := next(filter(_is_newer, schemas), None):
-        return f"line 1: {_newer(newer)}"
-    if header[: len(columns)] == list(columns):
-        unknown = ", ".join(header[len(columns) :])
-        return f"line 1: written by a newer strainbench, which also records {unknown}"
-    return f"line 1: {NO_HEADER}"
-
-
-def _is_newer(schema: str) -> bool:
-    return _is_number(schema) and float(schema) > SCHEMA
-
-
-def _newer(schema: str) -> str:
-    return f"written by a newer strainbench (schema {schema}; this one reads up to {SCHEMA})"
-
-
-def _record_fault(header: list[str], record: list[str]) -> str | None:
-    """What is wrong with a record as a whole."""
-    if record == header:
-        return ": the header once more"
-    if len(record) != len(header):
-        return f" has {len(record)} fields where {len(header)} are valid"
-    if broken := next(
-        (name for name, text in zip(header, record, strict=True) if "\n" in text), None
-    ):
-        return f", column {broken}: an end of line where text on one line is valid"
-    return None
-
-
-def _value_fault(row: Mapping[str, str]) -> str | None:
-    """What is wrong with a value, and the column it is in."""
-    schema = row.get("schema", "1")
-    if _is_newer(schema):
-        return f": {_newer(schema)}"
-    if schema not in map(str, range(1, SCHEMA + 1)):
-        return f", column schema: {schema!r} where 1 to {SCHEMA} is valid"
-    for name, text in row.items():
-        if text and (valid := _valid(name, text)):
-            return f", column {name}: {_short(text)} where {valid} is valid"
-    return None
-
-
-def _valid(name: str, text: str) -> str | None:
-    """What would be valid in a column, or None where `text` is."""
-    if name in COUNTS:
-        return None if text.isdecimal() and text.isascii() else "a whole number from 0 on"
-    if name in SETTINGS:
-        return None if _is_object(text) else "a JSON object"
-    return None if name in WORDS or _is_number(text) else "a number"
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return text.isascii() and "_" not in text
-
-
-def _is_object(text: str) -> bool:
-    try:
-        return isinstance(json.loads(text), dict)
-    except (ValueError, RecursionError):
-        return False
-
-
-def _short(text: str) -> str:
-    return repr(text if len(text) <= 40 else f"{text[:40]}...")
 
 
 @cache  # once a process, however often a file is read
@@ -227,7 +129,7 @@ def _as_csv(columns: Sequence[str], rows: Sequence[Mapping[str, object]], header
         writer.writeheader()
     for row in rows:
         texts = {name: _as_text(name, value) for name, value in row.items()}
-        if fault := _value_fault(texts):
+        if fault := value_fault(texts):
             raise RecordsError(f"a row to be written{fault}")
         writer.writerow({k: quoted(v) if k in WORDS else v for k, v in texts.items()})
     return buffer.getvalue().encode()
@@ -250,7 +152,7 @@ def _prepare(path: Path, columns: Sequence[str]) -> None:
             return
         with path.open("rb") as file:
             header = file.readline()
-    if header == ",".join(columns).encode() + b"\n" and _content(path, size - 1) == b"\n":
+    if header == ",".join(columns).encode() + b"\n" and content_of(path, size - 1) == b"\n":
         return
     rows, rest = _parsed(path, columns)
     if rest:
@@ -288,12 +190,12 @@ def settle(folder: Path) -> None:
 def _unsettled(folder: Path) -> dict[str, int]:
     """Sizes up to which files count while a cell's rows are not all there; else none."""
     path = folder / PENDING
-    content = _content(path)
+    content = content_of(path)
     try:
         sizes = {str(name): int(size) for name, size in json.loads(content or b"{}").items()}
     except (ValueError, AttributeError, TypeError):
         raise RecordsError(f"{path}: not a note of ours; {REPAIR}") from None
-    written = _content(folder / RUNS, sizes.get(RUNS, 0))
+    written = content_of(folder / RUNS, sizes.get(RUNS, 0))
     return {} if written.endswith(b"\n") else sizes
 
 
@@ -359,7 +261,7 @@ def read_machines(folder: Path) -> dict[str, dict[str, object]]:
 
 def _machines(folder: Path) -> dict[str, dict[str, object]]:
     path = folder / MACHINES
-    content = _content(path) if path.exists() else b"{}"
+    content = content_of(path) if path.exists() else b"{}"
     try:
         machines = json.loads(content.decode("utf-8-sig"))
     except (ValueError, RecursionError) as error:

@@ -8,41 +8,27 @@ next one resumes.
 
 from __future__ import annotations
 
-import json
-import pickle
 import shutil
-import subprocess
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from strainbench.bench.cell import Cell
+from strainbench.bench.court import POLL_SECONDS, Court
 from strainbench.bench.ending import Ending
-from strainbench.bench.isolation import Running, crashed
+from strainbench.bench.isolation import Running
 from strainbench.bench.journal import keep_targets
-from strainbench.bench.judge import (
-    CASE,
-    JUDGED,
-    VERDICT,
-    Verdict,
-    identity,
-    judge_limit,
-    serve,
-    unjudged,
-)
 from strainbench.bench.machine import describe_machine, fixed_threads
-from strainbench.bench.process import Child, Family, family
+from strainbench.bench.process import Family, family
 from strainbench.bench.recording import recorder
 from strainbench.bench.records import latest_runs, mend, open_folder, remember_machine, write_cell
-from strainbench.files import locked, uninterrupted
+from strainbench.bench.rows import identity
+from strainbench.files import locked
+from strainbench.progress import Observer as Observer
 from strainbench.referee.reference import REFERENCE_SOLVER
-
-POLL_SECONDS = 0.02
-LAST_GRACE = 3.0  # [s] for the referee to decide the open case when a run is interrupted
 
 
 @dataclass(frozen=True)
@@ -61,25 +47,6 @@ class Settings:
     jobs: int = 1
     memory_limit_mb: float = 8192.0
     rerun: bool = False
-
-
-class Observer:
-    """What a progress display may listen to."""
-
-    def planned(self, cells: Sequence[Cell], skipped: int) -> None:
-        """These cells will run, and so many had finished before."""
-
-    def started(self, cell: Cell) -> None:
-        """A cell's process was started."""
-
-    def stepped(self, cell: Cell, steps: int) -> None:
-        """A running cell has done so many steps."""
-
-    def ended(self, cell: Cell, row: dict[str, object]) -> None:
-        """A cell's row was written."""
-
-    def waiting(self, what: str) -> None:
-        """Nothing goes on until this comes."""
 
 
 @dataclass
@@ -157,7 +124,7 @@ class Runner:
         self.observer.planned(wanted, len(cells) - len(wanted))
         shutil.rmtree(self.scratch, ignore_errors=True)
         with fixed_threads(1), family() as ours:  # the referee's
-            court = Court(self, ours)
+            court = Court(ours, self.scratch, self._settle)
             with court.in_session():
                 missing = self._missing_recordings(wanted)
                 self._play_all(ours, missing, self._keep_recording, court)
@@ -234,6 +201,15 @@ class Runner:
             target.parent.mkdir(exist_ok=True)
             item.folder.rename(target)
 
+    def _settle(
+        self, item: Running, row: dict[str, object], steps: list[dict[str, object]]
+    ) -> None:
+        """Write down what the referee found of a cell, or why it found nothing."""
+        row["start_seconds"] = item.start_seconds()
+        self.summary.judging += float(str(row.get("judge_seconds", 0.0)))
+        self.write(item.cell, row, steps)
+        shutil.rmtree(item.folder, ignore_errors=True)
+
     def write(self, cell: Cell, row: dict[str, object], steps: Sequence[dict[str, object]]) -> None:
         """Append a cell's rows and tell the observer."""
         row["finished_at"] = datetime.now(UTC).isoformat(timespec="seconds")
@@ -241,110 +217,3 @@ class Runner:
         write_cell(self.settings.folder, row, steps)
         self.summary.cells += 1
         self.observer.ended(cell, row)
-
-
-@dataclass
-class Case:
-    """What is before the referee."""
-
-    item: Running
-    judged: int = 0
-    since: float = field(default_factory=time.monotonic)
-
-    def failure(self, referee: Child) -> str:
-        """Why the referee will not decide it, or ""."""
-        if (code := referee.exit_code) is not None:
-            return crashed(code).removeprefix(f"{Ending.CRASHED}: ")
-        path = self.item.folder / JUDGED
-        judged = path.stat().st_size if path.exists() else 0
-        if judged != self.judged:
-            self.judged, self.since = judged, time.monotonic()
-        limit = judge_limit(self.item.events)
-        if time.monotonic() - self.since > limit:
-            return f"hung on projection {judged + 1}, beyond its limit of {limit:g} s for one"
-        return ""
-
-
-class Court:
-    """The referee's process and the cases before it, one at a time.
-
-    A process that has failed on one case is not asked again: the next case has a fresh one.
-    """
-
-    def __init__(self, runner: Runner, ours: Family) -> None:
-        self._runner, self._family = runner, ours
-        self._waiting: deque[Running] = deque()
-        self._open: Case | None = None
-        self._referee: Child | None = None
-
-    @property
-    def idle(self) -> bool:
-        """Whether no case is left."""
-        return not self._waiting and self._open is None
-
-    @contextmanager
-    def in_session(self) -> Iterator[None]:
-        """Decide what is left at the end; after an interrupt what is open, if that is soon done."""
-        ended = False
-        try:
-            yield
-            ended = True
-        finally:
-            until = time.monotonic() + (float("inf") if ended else LAST_GRACE)
-            while time.monotonic() < until and (self._open or (ended and self._waiting)):
-                self.advance(ended)
-                time.sleep(POLL_SECONDS)
-
-    def take(self, item: Running) -> None:
-        """A cell that has ended becomes a case."""
-        self._waiting.append(item)
-
-    def advance(self, may_open: bool) -> None:
-        """Write down the open case if it is decided; open the next one if that is allowed."""
-        if self._open and (verdict := self._verdict(self._open)):
-            with uninterrupted():  # a case is settled once
-                item, self._open = self._open.item, None
-                self._settle(item, *verdict)
-        if self._waiting and self._open is None and may_open:
-            item = self._waiting.popleft()
-            self._hand_over(item)
-            self._open = Case(item)
-
-    def _hand_over(self, item: Running) -> None:
-        """Give a case to the referee's process, which is started if there is none."""
-        item.folder.mkdir(exist_ok=True)  # a plug-in may have removed it
-        if self._referee is None or self._referee.exit_code is not None:
-            folder = self._runner.scratch / f"referee-{len(self._family.children)}"
-            folder.mkdir(parents=True)
-            self._referee = self._family.start(serve, (), folder, subprocess.PIPE)
-        try:
-            (item.folder / CASE).write_bytes(pickle.dumps((item.cell, item.ending)))
-            stdin = self._referee.process.stdin
-            assert stdin is not None
-            stdin.write(json.dumps(str(item.folder)).encode() + b"\n")
-            stdin.flush()
-        except OSError:
-            self._referee.stop()  # which decides the case: see `Case.failure`
-
-    def _verdict(self, case: Case) -> Verdict | None:
-        """The rows of a case, or None while it is open."""
-        assert self._referee is not None
-        item, failure = case.item, case.failure(self._referee)
-        if (item.folder / VERDICT).exists():  # after the look at the process: none comes after
-            found = json.loads((item.folder / VERDICT).read_text(encoding="utf-8"))
-            if not isinstance(found, str):
-                return found[0], found[1]
-            failure = found
-        if not failure:
-            return None
-        if not (item.folder / VERDICT).exists():
-            self._referee.stop()
-        return unjudged(item.cell, item.folder, item.ending, failure)
-
-    def _settle(
-        self, item: Running, row: dict[str, object], steps: list[dict[str, object]]
-    ) -> None:
-        row["start_seconds"] = item.start_seconds()
-        self._runner.summary.judging += float(str(row.get("judge_seconds", 0.0)))
-        self._runner.write(item.cell, row, steps)
-        shutil.rmtree(item.folder, ignore_errors=True)

@@ -1,60 +1,149 @@
-"""Options that several verbs share, each declared once."""
+"""The options of the verbs, each declared once."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from strainbench.options import number, path, whole
+from strainbench.options import MOST, number, path, whole
 
+DEFAULT_SOLVER = "clarabel"
+RECORDER = "newton-ipm"  # the referee's, whose modules take long to import; a test compares
+MOST_THREADS = 1024
+LOCAL = Path("results/local")
+
+
+def _whole(name: str, about: str, most: int = MOST, metavar: str = "N") -> Any:
+    return typer.Option(name, parser=whole(name, most), metavar=metavar, help=about)
+
+
+def _number(name: str, about: str, of: str = "", metavar: str = "X") -> Any:
+    return typer.Option(name, parser=number(name, of), metavar=metavar, help=about)
+
+
+def _seconds(name: str, about: str) -> Any:
+    return _number(name, about, " of seconds", "SECONDS")
+
+
+def _folder(about: str) -> Any:
+    return typer.Option("--results", parser=path("--results"), metavar="DIR", help=about)
+
+
+def _output(about: str, what: str = "a folder", metavar: str = "FILE") -> Any:
+    return typer.Option("-o", "--output", parser=path("-o", what), metavar=metavar, help=about)
+
+
+# scenes
+Scenarios = Annotated[list[str], typer.Argument(help="scenario names, or paths of .py files")]
+AnyScenarios = Annotated[
+    list[str] | None, typer.Argument(help="scenario names, or paths; by default all of ours")
+]
 OneScenario = Annotated[str, typer.Argument(help="a scenario's name, or the path of a .py file")]
+Steps = Annotated[int, _whole("--steps", "time steps")]
+StepsOrAll = Annotated[
+    int | None, _whole("--steps", "time steps a cell; if not given, what the scene takes")
+]
+StepsToLast = Annotated[int, _whole("--steps", "time steps; the last one is drawn")]
+Every = Annotated[int, _whole("--every", "keep each K-th step", metavar="K")]
+Duration = Annotated[
+    float | None, _seconds("--duration", "of the scene's time a cell, instead of --steps")
+]
+FrameNumber = Annotated[int, _whole("--frame", "which projection, the first being 1", metavar="K")]
+FrameNumbers = Annotated[
+    str,
+    typer.Option("--frame", help="projections, the first being 1: 5,10 apart, 14-29 in sequence"),
+]
+
+# solvers
 AllSolvers = Annotated[
     list[str] | None,
     typer.Option(
         "--solver", help="name, comma-separated names, path of a .py file, or all (default)"
     ),
 ]
+Solvers = Annotated[
+    list[str],
+    typer.Option("--solver", help="name, comma-separated names, path of a .py file"),
+]
+SomeSolvers = Annotated[
+    str, typer.Option("--solver", help="name, comma-separated names, or a path")
+]
+OneSolver = Annotated[str, typer.Option("--solver", help="name, or path of a .py file")]
+SolverBefore = Annotated[
+    str,
+    typer.Option("--solver", help="answers the projections before; name, or path of a .py file"),
+]
+Tolerance = Annotated[float, _number("--tolerance", "aimed at by every solver")]
+TightestTolerance = Annotated[float, _number("--tolerance", "the tightest that solvers aim at")]
+Tolerances = Annotated[
+    str, typer.Option("--tolerance", help="aimed at by every solver; 1e-3,1e-6 for two")
+]
+Start = Annotated[
+    str,
+    typer.Option(
+        "--start", help="cold, warm (from the frame before, where a solver can) or cold,warm"
+    ),
+]
+
+# settings of both
+ManyValues = Annotated[
+    list[str] | None,
+    typer.Option("--set", help="KEY=V1,V2 of the scenario, or SOLVER.KEY=V1,V2"),
+]
 Values = Annotated[
     list[str] | None,
     typer.Option("--set", help="KEY=VALUE of the scenario or SOLVER.KEY=VALUE"),
+]
+ScenariosValues = Annotated[
+    list[str] | None, typer.Option("--set", help="KEY=VALUE of the scenarios")
 ]
 SolversValues = Annotated[
     list[str] | None,
     typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
 ]
-TableFile = Annotated[
-    Path | None,
-    typer.Option(
-        "-o",
-        "--output",
-        parser=path("-o", "a .csv or .md file"),
-        metavar="FILE",
-        help="a .csv or .md file to write too",
-    ),
+
+# how to run
+Mode = Annotated[str, typer.Option("--mode", help="simulate (closed loop) or replay (same frames)")]
+CellSeconds = Annotated[
+    float | None, _seconds("--time-limit", "a cell, physics and solver; none by default")
 ]
-Folder = Annotated[
-    Path,
-    typer.Option(
-        "--results", parser=path("--results"), metavar="DIR", help="folder of the results"
-    ),
+SolverSeconds = Annotated[float, _seconds("--time-limit", "a solver, all its runs")]
+ProjectionSeconds = Annotated[float, _seconds("--time-limit", "a projection")]
+Memory = Annotated[
+    float | None,
+    _number("--memory-limit", "a cell; by default 3/4 of the machine's, shared", " of MB", "MB"),
 ]
-Tolerance = Annotated[
-    float,
-    typer.Option(
-        "--tolerance", parser=number("--tolerance"), metavar="X", help="aimed at by every solver"
-    ),
+Jobs = Annotated[int, _whole("--jobs", "cells at a time; with more than one, times are disturbed")]
+Threads = Annotated[int, _whole("--threads", "threads a solver", MOST_THREADS)]
+Repeats = Annotated[int, _whole("--repeats", "turns of each solver on each frame")]
+Units = Annotated[
+    bool,
+    typer.Option("--units", help="beside factorisation + solve, and a step of implicit Euler"),
 ]
-Steps = Annotated[
-    int, typer.Option("--steps", parser=whole("--steps"), metavar="N", help="time steps")
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", help="address of a dask scheduler whose workers run the cells"),
 ]
-FrameNumber = Annotated[
-    int,
-    typer.Option(
-        "--frame",
-        parser=whole("--frame"),
-        metavar="K",
-        help="which projection, the first being 1",
-    ),
+Rerun = Annotated[bool, typer.Option("--rerun", help="run finished cells again")]
+
+# where it goes, and how it looks
+Folder = Annotated[Path, _folder("folder of the results")]
+FramesFolder = Annotated[Path, _folder("folder that keeps the frames")]
+TableFile = Annotated[Path | None, _output("a .csv or .md file to write too", "a .csv or .md file")]
+PicturesFolder = Annotated[Path, _output("folder", metavar="DIR")]
+ChartFile = Annotated[Path, _output("an .svg, .png or .pdf file", "an .svg, .png or .pdf file")]
+ProblemFile = Annotated[Path, _output("the file to write", "a file")]
+ProblemFormat = Annotated[
+    str | None,
+    typer.Option("--format", help="cbf or npz; by default what the file's name ends in"),
+]
+PictureFormats = Annotated[
+    str, typer.Option("--format", help="of png, gif, mp4, obj, ply, vtu, with commas")
+]
+View = Annotated[str, typer.Option("--camera", help="azimuth,elevation of the view, degrees")]
+Scale = Annotated[
+    str | None,
+    typer.Option("--scale", help="strain at the colour scale's end, such as 5%; else fitted"),
 ]

@@ -7,8 +7,6 @@ An exact limit bounds all directions at once, by the largest singular value of F
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,10 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from strainbench.arrays import FloatArray, frozen_array
-from strainbench.textfile import read_lines
-
-SAME_DIRECTION = 1e-9
-"""Directions whose unit vectors differ by less than this, up to sign, are one direction."""
+from strainbench.problem.curve import SAME_DIRECTION, read_curve
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,82 +160,14 @@ class StretchLimits:
 
         Instead of `bound` there may be `strain` (0.05) or `percent` (5), and `angle_radians`
         instead of degrees. Semicolons and tabs part columns too; with them numbers may have
-        decimal commas. Stretches outside PLAUSIBLE are refused, as strains or percentages.
+        decimal commas. Stretches outside `curve.PLAUSIBLE` are refused, as strains or percentages.
 
         Raises
         ------
         ValueError
             One line that names the file, and the line in it where it is about one.
         """
-        return cls.sampled(*_read_curve(Path(path)))
-
-
-PLAUSIBLE = (0.5, 3.0)
-"""Bounds of a measured curve, as stretches: cloth neither halves nor triples its length."""
-ANGLES = {"angle_degrees": np.pi / 180, "angle_radians": 1.0}
-STRETCHES = {"bound": (0.0, 1.0), "strain": (1.0, 1.0), "percent": (1.0, 0.01)}
-"""Columns, and what stretch a value v is: a + b v."""
-
-
-def _read_curve(path: Path) -> tuple[FloatArray, FloatArray]:
-    """Angles [rad] and stretches of a CSV file; see `StretchLimits.from_csv`."""
-    if not path.is_file():
-        raise ValueError(f"{path}: no such file")
-    lines = read_lines(path)
-    separator = next((c for c in ";\t" if c in lines[0]), ",")
-    try:
-        head, *rows = [[w.strip() for w in row] for row in csv.reader(lines, delimiter=separator)]
-    except (csv.Error, ValueError) as error:
-        raise ValueError(f"{path}: no CSV file ({error})") from None
-    angle, stretch = (_column(path, head, names) for names in (ANGLES, STRETCHES))
-    shift, factor = STRETCHES[head[stretch]]
-    angles: list[float] = []
-    bounds: list[float] = []
-    for number, row in enumerate(rows, start=2):
-        if not any(row):
-            continue
-        where = f"{path}, line {number}: {separator.join(row)}"
-        if len(row) != len(head):
-            raise ValueError(f"{where}: {len(row)} values for {len(head)} columns")
-        a, b = (_number(where, row[i], separator != ",") for i in (angle, stretch))
-        bound = shift + factor * b
-        if not PLAUSIBLE[0] <= bound <= PLAUSIBLE[1]:
-            raise ValueError(
-                f"{where}: {bound:g} is no stretch of cloth; {PLAUSIBLE[0]:g} to {PLAUSIBLE[1]:g} "
-                "is valid, 1.05 for 5%, or a column strain or percent instead of bound"
-            )
-        for other, known in zip(angles, bounds, strict=True):
-            if abs(np.sin(ANGLES[head[angle]] * (a - other))) < SAME_DIRECTION and known != bound:
-                raise ValueError(f"{where}: this direction has another bound above, {known:g}")
-        angles.append(a)
-        bounds.append(bound)
-    if not angles:
-        raise ValueError(f"{path}: no samples below the header")
-    largest = max(map(abs, angles))
-    if len(angles) > 1 and head[angle] == "angle_degrees" and 0 < largest < 3.15:
-        raise ValueError(
-            f"{path}: angle_degrees up to {largest:g} are radians; a column angle_radians is valid"
-        )
-    return ANGLES[head[angle]] * np.array(angles), np.array(bounds)
-
-
-def _column(path: Path, head: list[str], names: Iterable[str]) -> int:
-    """The index of the one column that has one of the names."""
-    found = [i for i, name in enumerate(head) if name in names]
-    if len(found) != 1:
-        valid = "valid are angle_degrees, bound, once each"
-        raise ValueError(f"{path}: columns {head}; {valid} ({' or '.join(names)})")
-    return found[0]
-
-
-def _number(where: str, text: str, decimal_commas: bool) -> float:
-    try:
-        value = float(text.replace(",", ".") if decimal_commas else text)
-    except ValueError:
-        raise ValueError(f"{where}: {text!r} is not a number") from None
-    if not np.isfinite(value):
-        raise ValueError(f"{where}: {text} is not finite")
-    return value
+        return cls.sampled(*read_curve(Path(path)))
 
 
 def _check_bounds(name: str, bounds: FloatArray, directions: int) -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -13,16 +11,10 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.physics.energies.contact import Obstacle
 from strainbench.problem.problem import Problem
+from strainbench.progress import Track as Track
+from strainbench.progress import untracked as untracked
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.stage import Stage, StageError, Who
-
-Track = Callable[[Iterable[Any], str, int], Iterable[Any]]
-"""(items, what they are, how many) to the same items, with a progress bar beside them."""
-
-
-def untracked(items: Iterable[Any], what: str, total: int) -> Iterable[Any]:  # noqa: ARG001
-    """The items, with nothing shown."""
-    return items
 
 
 @dataclass(frozen=True, eq=False)

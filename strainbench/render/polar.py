@@ -96,7 +96,7 @@ def polar(
     """
     if path.suffix not in SUFFIXES:
         raise ValueError(f"-o {path}: a name that ends in {', '.join(SUFFIXES)} is valid")
-    cells = plan_available(scenario, solvers, settings, steps, tolerance)
+    cells = plan_available(scenario, [solvers], settings, steps, tolerance)
     scene = cells[0].scenario.scenario()
     if scene.problem().rest.shape[1] != 2:
         raise ValueError(f"{scenario} is a volume: a scene of cloth is valid")

@@ -14,13 +14,10 @@ from strainbench.fields import same, spelled
 from strainbench.problem.grid import lumped_areas
 from strainbench.problem.limits import StretchLimits
 from strainbench.problem.problem import Problem
+from strainbench.progress import SceneWarning as SceneWarning
 
 EASY_LIMIT = 0.01  # tighter ones are checked on this one
 FEWEST_STEPS = 10  # of a run that is not told how many
-
-
-class SceneWarning(UserWarning):
-    """What a scene says of itself when it is planned; see `Scenario.notes`."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from types import SimpleNamespace
 import pytest
 
 from strainbench.bench.journal import read_journal
-from strainbench.bench.judge import _cut_off, _in_time, _outcome, judge_limit, unjudged
+from strainbench.bench.judge import _in_time, _outcome, judge_limit, unjudged
 from strainbench.bench.plan import plan
+from strainbench.bench.rows import cut_off
 from strainbench.referee.certificate import Certificate
 
 
@@ -62,8 +63,8 @@ def test_newton_failures_and_what_the_solver_says_are_told():
 def test_a_projection_cut_off_at_the_limit_counts_as_far_as_it_went():
     cell = SimpleNamespace(time_limit=10.0)
     events = [{"event": "started", "at": 100.0}, {"event": "projection", "at": 103.0}]
-    assert _cut_off(cell, events, "time limit of 10 s") == [7.0]
-    assert _cut_off(cell, events, "") == []
+    assert cut_off(cell, events, "time limit of 10 s") == [7.0]
+    assert cut_off(cell, events, "") == []
 
 
 LINES = [

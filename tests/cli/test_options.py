@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import pytest
 from typer.main import get_command
 
 from strainbench.bench.machine import describe_machine  # noqa: F401 (numba's import, off any clock)
+from strainbench.bench.runner import Runner
 from strainbench.cli import app as cli
+from strainbench.cli import listing
+from strainbench.cli.options import RECORDER
+from strainbench.referee.reference import REFERENCE_SOLVER
 from tests.command import command
 
 SOLVER = ["--solver", "none"]
@@ -177,6 +184,22 @@ def test_without_a_word_the_help_is_shown(monkeypatch, capsys):
     assert set(cli.VERBS) == set(commands)
 
 
+def test_help_and_version_import_nothing_heavy():
+    words = "import sys; sys.argv = ['strainbench', '--help']; import strainbench.cli as cli\n"
+    look = (
+        "try: cli.main()\nfinally: print(*{m.split('.')[0] for m in sys.modules}, file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", words + look], capture_output=True, text=True)
+    assert "Usage: " in done.stdout
+    heavy = {"numpy", "scipy", "numba", "pandas", "matplotlib", "cvxpy", "psutil", "distributed"}
+    assert "typer" in done.stderr.split()
+    assert not heavy & set(done.stderr.split())
+
+
+def test_frames_are_exported_with_the_answers_of_the_reference_solver():
+    assert RECORDER == REFERENCE_SOLVER
+
+
 def test_the_version(monkeypatch, capsys):
     done = command(monkeypatch, capsys, "--version")
     assert (done.returncode, done.stdout) == (0, f"strainbench {cli.__version__}\n")
@@ -193,7 +216,7 @@ def fail(error):
 
 
 def test_a_fault_of_ours_is_one_line_and_status_1(monkeypatch, capsys):
-    monkeypatch.setattr(cli, "tables", fail(KeyError("colour")))
+    monkeypatch.setattr(listing, "tables", fail(KeyError("colour")))
     line = is_one_line(command(monkeypatch, capsys, "list"), status=1)
     assert "KeyError: 'colour'" in line
     assert "STRAINBENCH_DEBUG=1 shows where" in line
@@ -204,14 +227,14 @@ def test_a_fault_of_ours_is_one_line_and_status_1(monkeypatch, capsys):
 
 def test_an_error_of_the_disk_is_one_line_and_status_1(monkeypatch, capsys):
     error = OSError(28, "No space left on device", "/full/runs.csv")
-    monkeypatch.setattr(cli, "tables", fail(error))
+    monkeypatch.setattr(listing, "tables", fail(error))
     line = is_one_line(command(monkeypatch, capsys, "list"), status=1)
     assert line == "strainbench: /full/runs.csv: No space left on device\n"
 
 
 def test_an_interrupt_says_what_is_kept_only_where_something_is(monkeypatch, capsys, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(cli, "tables", fail(KeyboardInterrupt()))
+    monkeypatch.setattr(listing, "tables", fail(KeyboardInterrupt()))
     done = command(monkeypatch, capsys, "list")
     assert (done.returncode, done.stderr) == (130, "strainbench: interrupted\n")
 
@@ -220,7 +243,7 @@ def test_an_interrupt_says_what_is_kept_only_where_something_is(monkeypatch, cap
         raise KeyboardInterrupt
 
     skipped = [1, 0]
-    monkeypatch.setattr(cli.Runner, "run", interrupted)
+    monkeypatch.setattr(Runner, "run", interrupted)
     for kept in ("no cell had finished", "every finished cell is kept (1 of 1)"):
         done = command(monkeypatch, capsys, "run", *VERBS["run"])
         assert done.returncode == 130

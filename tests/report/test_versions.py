@@ -8,10 +8,10 @@ import sys
 import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS
-from strainbench.bench.judge import identity
 from strainbench.bench.machine import PACKAGES, describe_machine, installed
 from strainbench.bench.plan import plan
 from strainbench.bench.records import RUNS, append_rows, remember_machine
+from strainbench.bench.rows import identity
 from strainbench.report import load_runs, versions
 from strainbench.report.table import older
 from strainbench.report.versions import UNKNOWN, shown_runs

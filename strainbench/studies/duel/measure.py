@@ -148,13 +148,11 @@ def duel(
         for repeat in range(repeats):
             turns = list(rotated(list(zip(solvers, entries, strict=True)), repeat))
             for frames in sequences:
-                states = [_prepared(solver, problem, entry) for solver, entry in turns]  # 2
+                ready = [Prepared(solver, problem, entry) for solver, entry in turns]  # 2
                 for number in frames:
                     frame = recording.frame(number)
-                    for (solver, entry), state in zip(turns, states, strict=True):  # 3
-                        answer = run_solver(solver, frame, state, tolerance, time_limit)
-                        entry.seconds.append(answer.seconds)
-                        entry.answers[number] = answer
+                    for turn in ready:  # 3
+                        turn.take_turn(number, frame, tolerance, time_limit)
                         progress()
                     if unit:
                         unit.take_turn()
@@ -170,11 +168,22 @@ def rotated(items: Sequence[Any], by: int) -> Iterator[Any]:
         yield items[(k + by) % len(items)]
 
 
-def _prepared(solver: Solver, problem: Problem, entry: Racer) -> Any:
-    begin = perf_counter()
-    state = solver.prepare(problem)
-    entry.setups.append(perf_counter() - begin)
-    return state
+class Prepared:
+    """A solver that is prepared, with what is measured of it."""
+
+    def __init__(self, solver: Solver, problem: Problem, entry: Racer) -> None:
+        begin = perf_counter()
+        self._state = solver.prepare(problem)
+        entry.setups.append(perf_counter() - begin)
+        self._solver, self._entry = solver, entry
+
+    def take_turn(
+        self, number: int, frame: Problem, tolerance: float, time_limit: float | None
+    ) -> None:
+        """Project one frame."""
+        answer = run_solver(self._solver, frame, self._state, tolerance, time_limit)
+        self._entry.seconds.append(answer.seconds)
+        self._entry.answers[number] = answer
 
 
 def judge(entries: Sequence[Racer], recording: Recording) -> None:

@@ -1,0 +1,211 @@
+"""The verbs that look at projections of one scene, or at what scenes model."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+
+from strainbench import __version__
+from strainbench.cli.display import console, progress, say, tracking
+from strainbench.cli.interrupt import keeping
+from strainbench.cli.options import (
+    DEFAULT_SOLVER,
+    LOCAL,
+    RECORDER,
+    AllSolvers,
+    AnyScenarios,
+    Folder,
+    FrameNumber,
+    FrameNumbers,
+    FramesFolder,
+    OneScenario,
+    OneSolver,
+    ProblemFile,
+    ProblemFormat,
+    ProjectionSeconds,
+    Repeats,
+    ScenariosValues,
+    SolverBefore,
+    Solvers,
+    SolverSeconds,
+    SolversValues,
+    Steps,
+    TableFile,
+    TightestTolerance,
+    Tolerance,
+    Units,
+    Values,
+)
+from strainbench.escape import plain
+
+if TYPE_CHECKING:
+    from strainbench.bench.cell import Cell
+    from strainbench.bench.recording import Recording
+    from strainbench.problem.problem import Problem
+
+
+def export_frame(
+    scenario: OneScenario,
+    frame: FrameNumber,
+    output: ProblemFile,
+    format_: ProblemFormat = None,
+    solver: SolverBefore = RECORDER,
+    set_: Values = None,
+    tolerance: Tolerance = 1e-6,
+) -> None:
+    """Write one projection of a scene as a conic instance (CBF) or as arrays (npz)."""
+    from strainbench.bench.plan import plan_one
+    from strainbench.files import open_folder
+    from strainbench.problem.export import check_format, write_problem
+
+    if output.is_dir():
+        raise ValueError(
+            f"-o {output} is a folder: a file is valid, such as {output / 'frame.cbf'}"
+        )
+    kind = check_format(output.suffix.removeprefix(".") if format_ is None else format_)
+    cell = plan_one(scenario, solver, set_ or [], frame, tolerance)
+    open_folder(output.parent, "-o")
+    problem = _record(cell, frame)
+    before = f"those before by {cell.solver.label}"
+    about = f"{cell.scenario.label}, projection {frame}, {before}; strainbench {__version__}"
+    write_problem(problem, output, kind, about)
+    size = f"{3 * len(problem.free)} variables, {problem.constraints} constraints"
+    say(f"wrote {output}: {size}")
+
+
+def follow_solvers(
+    scenario: OneScenario,
+    frame: FrameNumber,
+    solver: AllSolvers = None,
+    set_: SolversValues = None,
+    tolerance: TightestTolerance = 1e-8,
+    time_limit: SolverSeconds = 60.0,
+    results: Folder = LOCAL / "convergence",
+) -> None:
+    """Follow solvers on one projection of a scene: violation, gap and distance against time."""
+    from strainbench.bench.machine import memory_share
+    from strainbench.bench.plan import plan_scene
+    from strainbench.bench.recording import recorder
+    from strainbench.studies.convergence.measure import CANDIDATE, converge
+    from strainbench.studies.convergence.report import write_convergence
+
+    cells = plan_scene(scenario, solver or ["all"], set_ or [], 1, tolerance, time_limit)
+    if all(cell.solver.label == CANDIDATE for cell in cells):
+        there = "the candidate itself is there in any case"
+        raise ValueError(f"--solver {CANDIDATE}: {there}; the names of other solvers are valid")
+    problem = _record(recorder(cells[0]), frame)
+    ended = converge(cells, problem, frame, results, memory_share())
+    told: list[Cell] = []
+
+    def kept() -> str:
+        return f"; the rows of {len(told)} of {len(cells)} solvers are kept" if told else ""
+
+    with keeping(kept), progress() as bar:
+        for cell, ending in bar.track(ended, len(cells), description="solvers"):
+            say(f"{cell.solver.label}: {ending}", bar.console)
+            told.append(cell)
+    for written in write_convergence(results):
+        say(f"wrote {written}")
+
+
+def let_duel(
+    scenario: OneScenario,
+    frame: FrameNumbers,
+    solver: Solvers,
+    set_: SolversValues = None,
+    repeats: Repeats = 5,
+    tolerance: Tolerance = 1e-6,
+    time_limit: ProjectionSeconds = 60.0,
+    units: Units = False,
+    results: FramesFolder = LOCAL / "duel",
+    output: TableFile = None,
+) -> None:
+    """Let solvers take turns on the same projections: ratios of times in one run."""
+    from strainbench.bench.machine import describe_machine
+    from strainbench.bench.plan import plan_available
+    from strainbench.studies.duel.measure import duel, parse_frames
+    from strainbench.studies.duel.report import Outcome, check_ending, write_outcome
+
+    sequences = parse_frames(frame)
+    if output is not None:
+        check_ending(output)
+    cells = plan_available(scenario, solver, set_ or [], 1, tolerance, time_limit)
+    solvers = [cell.solver.solver() for cell in cells]
+    machine, about = describe_machine(threads=1)
+    recording = _recorded(cells[0], max(map(max, sequences)), None if units else results)
+    turns = repeats * sum(map(len, sequences)) * len(cells)
+    with progress() as bar:
+        task = bar.add_task("projections", total=turns)
+        entries = duel(
+            solvers,
+            recording,
+            sequences,
+            repeats,
+            tolerance,
+            time_limit,
+            units,
+            lambda: bar.advance(task),
+        )
+    for entry, cell in zip(entries, cells, strict=False):  # units of time may follow
+        entry.label = cell.solver.label
+    title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
+    outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
+    Console(width=max(console.width, 200)).print(outcome.table())  # its columns are many
+    if output is not None:
+        write_outcome(outcome, output)
+        say(f"wrote {output}")
+
+
+def keep_ledger(
+    scenarios: AnyScenarios = None,
+    solver: OneSolver = DEFAULT_SOLVER,
+    set_: ScenariosValues = None,
+    steps: Steps = 60,
+    tolerance: Tolerance = 1e-6,
+    results: Folder = LOCAL / "ledger",
+) -> None:
+    """Write what each scene models, and what each part of its physics changes in the answer."""
+    from strainbench.bench.plan import plan
+    from strainbench.scenario.registry import list_scenarios
+    from strainbench.studies.ledger import write_ledger
+
+    names = scenarios or [entry.name for entry in list_scenarios()]
+    cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
+    with tracking() as track:
+        written = write_ledger(cells, results, track)
+    for file in written:
+        say(f"wrote {file}")
+
+
+def _record(cell: Cell, frame: int) -> Problem:
+    """A projection of a scene, with a progress bar on the way there."""
+    from strainbench.bench.recording import record
+
+    with _playing(cell, frame) as asked:
+        return record(cell, frame, asked)
+
+
+def _recorded(cell: Cell, last: int, results: Path | None) -> Recording:
+    """A scene's projections, those kept in a folder or, with times, those played now."""
+    from strainbench.bench.machine import fixed_threads
+    from strainbench.bench.recording import record_all, recorded, recorder
+
+    fed = recorder(cell)
+    with fixed_threads(1), _playing(fed, last) as asked:
+        if results is None:
+            return record_all(fed, last, asked)
+        return recorded(fed, last, results / "frames", asked)
+
+
+@contextmanager
+def _playing(cell: Cell, frame: int) -> Iterator[Callable[[int], None]]:
+    """What shows how many projections a scene has asked for, on its way to `frame`."""
+    with progress() as bar:
+        task = bar.add_task(plain(f"playing {cell.title}"), total=max(frame - 1, 1))
+        yield lambda asked: bar.update(task, completed=asked - 1)
