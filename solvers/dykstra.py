@@ -33,13 +33,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
+from strainbench.problem.leverage import Leverage
+from strainbench.problem.rows import Rows, add_row, gather, spread
 from strainbench.solver.memory import Memory
 
 ROWS_A_CHUNK = 1_000_000
@@ -48,42 +50,31 @@ ROWS_A_CHUNK = 1_000_000
 CHECK = 20
 """Step 5 comes each time that the sweeps have grown by one in so many: 5% of the time at most."""
 
-NO_LEVERAGE = 1e-24
-"""A constraint with L below this part of what all its vertices would give is fixed by its pins."""
-
 
 class Blocks(NamedTuple):
-    """G by constraint, c of them with m rows each, and the steps; the same for all frames.
+    """The rows of each constraint, c of them with m rows; W g (c, m, k); 1/L (c,), or 0."""
 
-    vertices : (c, k); coefficients : (c, m, k), g [1/m]; moves : (c, m, k), W g;
-    steps : (c,) 1/L, or 0 where no free vertex can change the constraint;
-    corners, axes : k and m zeros; their lengths are known to the compiler, which unrolls loops.
-    """
-
-    vertices: Any
-    coefficients: Any
-    moves: Any
-    steps: Any
-    corners: tuple[int, ...]
-    axes: tuple[int, ...]
+    G: Rows
+    moves: FloatArray
+    steps: FloatArray
 
 
 class Frame(NamedTuple):
     """b (c,), t (n, 3), G t (c, m, 3), and M (n, 1), which is 0 at a pin."""
 
-    b: Any
-    t: Any
-    Gt: Any
-    M: Any
+    b: FloatArray
+    t: FloatArray
+    Gt: FloatArray
+    M: FloatArray
 
 
 class Run(NamedTuple):
     """An iterate x (n, 3), Y (c, m, 3), the one before, Nesterov's t_k, and D(Y)."""
 
-    x: Any
-    Y: Any
-    x_last: Any
-    Y_last: Any
+    x: FloatArray
+    Y: FloatArray
+    x_last: FloatArray
+    Y_last: FloatArray
     momentum: float
     dual: float
 
@@ -171,24 +162,13 @@ class Dykstra(Solver):
 
     def _advance(self, G: Blocks, frame: Frame, run: Run, sweeps: int) -> Run:
         """An even number of sweeps."""
-        after: Run = (accelerated if self.accelerate else plain)(G, frame, run, sweeps)
-        return after
+        return (accelerated if self.accelerate else plain)(G, frame, run, sweeps)
 
 
 def blocks(problem: Problem) -> Blocks:
     """What the loops need of the mesh."""
-    c, k = problem.constraints, problem.elements.shape[1]
-    m = problem.rows // c
-    w = np.zeros(problem.vertices)
-    w[problem.free] = 1 / problem.weights[problem.free]
-    g = problem.row_coefficients.reshape(c, m, k)
-    vertices = problem.row_vertices.reshape(c, m, k)[:, 0]
-    L = np.linalg.eigvalsh(np.einsum("cmk,ck,clk->cml", g, w[vertices], g))[:, -1]
-    all_free = np.einsum("cmk,ck->c", g**2, 1 / problem.weights[vertices])
-    movable = NO_LEVERAGE * all_free < L
-    steps = np.divide(1.0, L, out=np.zeros(c), where=movable)
-    moves = g * w[vertices][:, None]
-    return Blocks(vertices.astype(np.int32), g.copy(), moves, steps, (0,) * k, (0,) * m)
+    levers = Leverage.of(problem)
+    return Blocks(Rows.of(problem), levers.moves, levers.steps)
 
 
 def start(problem: Problem, G: Blocks, multipliers: FloatArray) -> tuple[Frame, Run]:
@@ -203,25 +183,25 @@ def start(problem: Problem, G: Blocks, multipliers: FloatArray) -> tuple[Frame, 
 
 
 @compiled
-def plain(G, frame, run, sweeps):  # type: ignore[no-untyped-def]
+def plain(mesh: Blocks, frame: Frame, run: Run, sweeps: int) -> Run:
     """So many sweeps forwards, in place."""
-    norms = np.zeros(len(G.steps))
+    norms = np.zeros(len(mesh.steps))
     for _ in range(sweeps):
-        sweep(G, frame.b, run.x, run.Y, norms, False)
+        sweep(mesh, frame.b, run.x, run.Y, norms, False)
     return run
 
 
 @compiled
-def accelerated(G, frame, run, sweeps):  # type: ignore[no-untyped-def]
+def accelerated(mesh: Blocks, frame: Frame, run: Run, sweeps: int) -> Run:
     """So many sweeps, there and back."""
     x, Y, x_last, Y_last, momentum, dual = run
-    norms = np.zeros(len(G.steps))
+    norms = np.zeros(len(mesh.steps))
     for _ in range(sweeps // 2):
         larger = (1 + np.sqrt(1 + 4 * momentum**2)) / 2
         beta = (momentum - 1) / larger
         x_new, Y_new = x + beta * (x - x_last), Y + beta * (Y - Y_last)  # 3
-        sweep(G, frame.b, x_new, Y_new, norms, False)
-        sweep(G, frame.b, x_new, Y_new, norms, True)
+        sweep(mesh, frame.b, x_new, Y_new, norms, False)
+        sweep(mesh, frame.b, x_new, Y_new, norms, True)
         linear = np.dot(Y_new.reshape(-1), frame.Gt.reshape(-1)) - np.dot(frame.b, norms)
         value = linear - 0.5 * np.sum(frame.M * (x_new - frame.t) ** 2)
         if value < dual and beta > 0:  # 4
@@ -232,43 +212,32 @@ def accelerated(G, frame, run, sweeps):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def sweep(G, b, x, Y, norms, back):  # type: ignore[no-untyped-def]
+def sweep(
+    mesh: Blocks, b: FloatArray, x: FloatArray, Y: FloatArray, norms: FloatArray, reverse: bool
+) -> None:
     """Steps 1 and 2 for each constraint, forwards or back; `norms` takes the |Y_i|."""
+    G, moves, steps = mesh
     Z = np.empty((len(G.axes), 3))
-    for number in range(len(G.steps)):
-        i = len(G.steps) - 1 - number if back else number
-        if G.steps[i] == 0:
+    for number in range(len(b)):
+        i = len(b) - 1 - number if reverse else number
+        step = steps[i]
+        if step == 0:
             continue
-        stretch(G, i, x, Z)
+        gather(G, i, x, Z)
         for a in range(len(G.axes)):  # 1
             for c in range(3):
-                Z[a, c] = Y[i, a, c] + G.steps[i] * Z[a, c]
-        _, norms[i] = shrink(Z, G.axes, G.steps[i] * b[i])
+                Z[a, c] = Y[i, a, c] + step * Z[a, c]
+        _, norms[i] = shrink(Z, G.axes, step * b[i])
         if norms[i] == 0 and not np.any(Y[i]):
             continue
         for a in range(len(G.axes)):  # 2
-            for c in range(3):
-                change = Z[a, c] - Y[i, a, c]
-                Y[i, a, c] = Z[a, c]
-                for k in range(len(G.corners)):
-                    x[G.vertices[i, k], c] -= G.moves[i, a, k] * change
+            back = Y[i, a, 0] - Z[a, 0], Y[i, a, 1] - Z[a, 1], Y[i, a, 2] - Z[a, 2]
+            Y[i, a, 0], Y[i, a, 1], Y[i, a, 2] = Z[a, 0], Z[a, 1], Z[a, 2]
+            add_row(G, moves, i, a, back, x)
 
 
 @compiled
-def stretch(G, i, x, y):  # type: ignore[no-untyped-def]
-    """Fill y (m, 3) with G_i x."""
-    for a in range(len(G.axes)):
-        y0 = y1 = y2 = 0.0
-        for k in range(len(G.corners)):
-            v, g = G.vertices[i, k], G.coefficients[i, a, k]
-            y0 += g * x[v, 0]
-            y1 += g * x[v, 1]
-            y2 += g * x[v, 2]
-        y[a, 0], y[a, 1], y[a, 2] = y0, y1, y2
-
-
-@compiled
-def shrink(A, axes, t):  # type: ignore[no-untyped-def]
+def shrink(A: FloatArray, axes: tuple[int, ...], t: float) -> tuple[float, float]:
     """Lower the singular values of A (m, 3) by t; return the largest before, their sum after."""
     if len(axes) == 1:
         s = np.sqrt(A[0, 0] ** 2 + A[0, 1] ** 2 + A[0, 2] ** 2)
@@ -296,28 +265,26 @@ def shrink(A, axes, t):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def place(G, frame, x, Y):  # type: ignore[no-untyped-def]
+def place(mesh: Blocks, frame: Frame, x: FloatArray, Y: FloatArray) -> None:
     """Set x = t - W G^T Y."""
     x[:] = frame.t
-    for i in range(len(G.steps)):
-        for a in range(len(G.axes)):
-            for k in range(len(G.corners)):
-                for c in range(3):
-                    x[G.vertices[i, k], c] -= G.moves[i, a, k] * Y[i, a, c]
+    for i in range(len(Y)):
+        spread(mesh.G, mesh.moves, i, -Y[i], x)
 
 
 @compiled
-def judge(G, frame, run):  # type: ignore[no-untyped-def]
+def judge(mesh: Blocks, frame: Frame, run: Run) -> tuple[float, float, float]:
     """Largest violation, gap and objective; x is set afresh.
 
     x_last too: momentum makes any difference between the rounding errors of the two grow.
     """
-    place(G, frame, run.x, run.Y)
-    place(G, frame, run.x_last, run.Y_last)
+    place(mesh, frame, run.x, run.Y)
+    place(mesh, frame, run.x_last, run.Y_last)
+    G = mesh.G
     y = np.empty((len(G.axes), 3))
     violation = gap = 0.0
-    for i in range(len(G.steps)):
-        stretch(G, i, run.x, y)
+    for i in range(len(frame.b)):
+        gather(G, i, run.x, y)
         gap -= np.sum(y * run.Y[i])
         stretched, _ = shrink(y, G.axes, 0.0)
         y[:] = run.Y[i]

@@ -35,12 +35,10 @@ from scipy.sparse.linalg import splu
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.problem.leverage import Leverage, free_numbers
 
 EXPLODED = 1e3
 """Largest C, beside the target's own or 1, beyond which positions are given up."""
-
-NO_LEVERAGE = 1e-24
-"""A row with D below this part of what all its vertices would give is fixed by its pins."""
 
 DECREASE, HALVINGS = 1e-4, 20
 """Armijo's condition with its customary factor (Nocedal and Wright 2006, Sec. 3.1)."""
@@ -74,14 +72,14 @@ class FastProjection(Solver):
     line_search: bool = True
     max_iterations: int = 300
 
-    def prepare(self, problem: Problem) -> Rows:
+    def prepare(self, problem: Problem) -> Newton:
         """D, and where the entries of J go."""
-        return Rows(problem)
+        return Newton(problem)
 
     def solve(
         self,
         problem: Problem,
-        state: Rows,
+        state: Newton,
         *,
         tolerance: float,
         monitor: Callable[..., None],
@@ -98,7 +96,7 @@ class FastProjection(Solver):
                 break
             if deadline.passed:
                 return Solution(x, "time limit", iteration)
-            violated = np.flatnonzero((C > 0) & state.movable)
+            violated = np.flatnonzero((C > 0) & (state.D > 0))
             J = state.jacobian(violated, y[violated])  # 2
             try:
                 dx = state.newton_step(J, C[violated], self.regularisation * state.D[violated])  # 3
@@ -116,7 +114,7 @@ class FastProjection(Solver):
     def _advance(
         self,
         problem: Problem,
-        state: Rows,
+        state: Newton,
         x: FloatArray,
         dx: FloatArray,
         C: FloatArray,
@@ -141,24 +139,18 @@ def constraints(problem: Problem, x: FloatArray) -> tuple[FloatArray, FloatArray
         return y, np.sqrt(np.sum(y**2, axis=1)) - problem.bounds
 
 
-class Rows:
-    """What stays the same from frame to frame.
+class Newton:
+    """Steps 2 and 3, and phi; the same from frame to frame.
 
-    D : (rows,) diagonal of J W J^T, sum_k w_k g_k^2 over the free vertices: |y_i/|y_i|| is 1.
-    movable : (rows,) whether a free vertex can change the row.
+    D : (rows,) diagonal of J W J^T, sum_k w_k g_k^2 over the free vertices: |y_i/|y_i|| is 1; 0
+    where no free vertex can change the row.
     """
 
     def __init__(self, problem: Problem) -> None:
-        n = len(problem.free)
-        number = np.full(problem.vertices, -1)
-        number[problem.free] = np.arange(n)
-        self._columns = number[problem.row_vertices]
+        self._columns = free_numbers(problem)[problem.row_vertices]
         self._g = problem.row_coefficients
         self._mass = np.repeat(problem.weights[problem.free], 3)
-        terms = self._g**2 / problem.weights[problem.row_vertices]
-        diagonal = np.sum(np.where(self._columns >= 0, terms, 0.0), axis=1)
-        self.D = diagonal
-        self.movable = diagonal > NO_LEVERAGE * np.sum(terms, axis=1)
+        self.D = Leverage.of(problem).total
 
     def jacobian(self, rows: IntArray, y: FloatArray) -> sp.csr_array:
         """(r, 3 n) J of these rows over the free coordinates, from their y (r, 3)."""
@@ -186,6 +178,6 @@ class Rows:
 
     def merit(self, C: FloatArray) -> float:
         """phi, over the rows that can move."""
+        movable = self.D > 0
         with np.errstate(over="ignore"):
-            squares = np.maximum(C[self.movable], 0.0) ** 2
-            return 0.5 * float(np.sum(squares / self.D[self.movable]))
+            return 0.5 * float(np.sum(np.maximum(C[movable], 0.0) ** 2 / self.D[movable]))

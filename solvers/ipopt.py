@@ -20,6 +20,7 @@ import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.problem.leverage import Pairs
 from strainbench.solver.claim import claimed
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
@@ -90,14 +91,14 @@ class Ipopt(Solver):
         if self.hessian not in ("exact", "limited-memory"):
             raise ValueError(f"hessian is {self.hessian!r}: valid are exact, limited-memory")
 
-    def rows(self, problem: Problem) -> Rows:
+    def lengths(self, problem: Problem) -> Lengths:
         """What is bounded: the limited directions."""
         g = problem.row_coefficients
-        return Rows(problem.row_vertices, g, problem.lower_bounds, problem.bounds)
+        return Lengths(problem.row_vertices, g, problem.lower_bounds, problem.bounds)
 
     def prepare(self, problem: Problem) -> Memory[Structure]:
         """The sparsity of the derivatives."""
-        return Memory(Structure(problem, self.rows(problem)), self.warm)
+        return Memory(Structure(problem, self.lengths(problem)), self.warm)
 
     def solve(
         self,
@@ -126,17 +127,17 @@ class Ipopt(Solver):
         start = positions[problem.free].ravel() / unit
         if start.size == 0:
             return held_still(problem, tolerance)
-        rows, options, given = state.mesh.rows, self._options(tolerance, deadline), {}
+        bounds, options, given = state.mesh.lengths, self._options(tolerance, deadline), {}
         if np.any(Y):
             options["warm_start_init_point"] = "yes"
             y = nlp.stretched(start)
             given["lagrange"] = scale / 2 * np.sum(Y * y, axis=1) / np.sum(y**2, axis=1)
         ipopt = cyipopt.Problem(
             n=start.size,
-            m=len(rows.bounds),
+            m=len(bounds.upper),
             problem_obj=nlp,
-            cl=np.where(rows.lower > 0, rows.lower**2, -np.inf),
-            cu=rows.bounds**2,
+            cl=np.where(bounds.lower > 0, bounds.lower**2, -np.inf),
+            cu=bounds.upper**2,
         )
         for option, value in options.items():
             ipopt.add_option(option, value)
@@ -174,16 +175,16 @@ class Ipopt(Solver):
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Bounds on lengths: lower <= ||y_i|| <= bounds with y_i = sum_k g_k x_k.
+class Lengths:
+    """Bounds on lengths: lower <= ||y_i|| <= upper with y_i = sum_k g_k x_k.
 
-    vertices : (rows, k); coefficients : (rows, k), g [1/m]; lower, bounds : (rows,).
+    vertices : (rows, k); coefficients : (rows, k), g [1/m]; lower, upper : (rows,).
     """
 
     vertices: IntArray
     coefficients: FloatArray
     lower: FloatArray
-    bounds: FloatArray
+    upper: FloatArray
 
 
 class Structure:
@@ -191,39 +192,24 @@ class Structure:
 
     Attributes
     ----------
-    rows : what is bounded
+    lengths : what is bounded
     G, fixed : (rows, free vertices) and (rows, pins) sparse [1/m]
     row, value : (non-zeros of G,) row index and entry [1/m] of each non-zero
     jacobian, hessian : (row indices, column indices), the Hessian's of the lower triangle
-    products : (pairs, rows) sparse: 2 g_iv g_iw [1/m^2] for each pair of neighbours v >= w
-    diagonal : (free vertices,) index of the pair (v, v)
+    pairs : of neighbours
     """
 
-    def __init__(self, problem: Problem, rows: Rows) -> None:
-        n, count = len(problem.free), len(rows.bounds)
-        self.rows = rows
-        places = np.repeat(np.arange(count), rows.vertices.shape[1]), rows.vertices.ravel()
-        shape = (count, problem.vertices)
-        G = sp.csr_array(sp.coo_array((rows.coefficients.ravel(), places), shape=shape))
+    def __init__(self, problem: Problem, lengths: Lengths) -> None:
+        self.lengths, count = lengths, len(lengths.upper)
+        vertices, g = lengths.vertices, lengths.coefficients
+        places = np.repeat(np.arange(count), vertices.shape[1]), vertices.ravel()
+        G = sp.csr_array(sp.coo_array((g.ravel(), places), shape=(count, problem.vertices)))
         self.G, self.fixed = sp.csr_array(G[:, problem.free]), G[:, problem.pinned]
         entries = self.G.tocoo()
         self.row, self.value = entries.row, entries.data
         self.jacobian = np.repeat(self.row, 3), _coordinates(entries.col)
-
-        unknown = np.full(problem.vertices, -1)
-        unknown[problem.free] = np.arange(n)
-        column, g = unknown[rows.vertices], rows.coefficients
-        a, b = np.tril_indices(column.shape[1])
-        v, w = np.maximum(column[:, a], column[:, b]), np.minimum(column[:, a], column[:, b])
-        i, pair = np.nonzero(w >= 0)
-        keys = np.concatenate([(v * n + w)[i, pair], np.arange(n) * (n + 1)])
-        found, index = np.unique(keys, return_inverse=True)
-        self.products = sp.csr_array(
-            (2 * (g[:, a] * g[:, b])[i, pair], (index[: len(i)], i)),
-            shape=(len(found), count),
-        )
-        self.diagonal = index[len(i) :]
-        self.hessian = _coordinates(found // max(n, 1)), _coordinates(found % max(n, 1))
+        self.pairs = Pairs(problem, vertices, g)
+        self.hessian = _coordinates(self.pairs.rows), _coordinates(self.pairs.columns)
 
 
 def _coordinates(vertices: IntArray) -> IntArray:
@@ -292,8 +278,9 @@ class Callbacks:
 
     def hessian(self, x: FloatArray, multipliers: FloatArray, factor: float) -> FloatArray:
         """Of factor times the objective plus multipliers times constraints."""
-        values = self.unit**2 * (self.structure.products @ multipliers)
-        values[self.structure.diagonal] += factor * self.weights[:, 0]
+        pairs = self.structure.pairs
+        values = self.unit**2 * (pairs.products @ (2 * multipliers))
+        values[pairs.diagonal] += factor * self.weights[:, 0]
         return np.repeat(values, 3)
 
     def intermediate(self, algorithm: int, iteration: int, *progress: float) -> bool:

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solvers.ipopt import Ipopt, Rows, Structure
+from solvers.ipopt import Ipopt, Lengths, Structure
 from strainbench import Clock, Problem, Solution, StretchLimits
 from strainbench.solver.memory import Memory
 
@@ -54,18 +54,20 @@ class IpoptEdges(Ipopt):
         """A reason, where the limits leave edges of any length or of none."""
         if refusal := super().supports(problem):
             return refusal
-        rows = self.rows(problem)
-        if len(rows.bounds) == 0:
+        lengths = self.lengths(problem)
+        if len(lengths.upper) == 0:
             return "a single limited direction bounds the length of no edge"
-        return "lower edge lengths above the upper ones" if rows.bounds.min() < self.lower else None
+        return (
+            "lower edge lengths above the upper ones" if lengths.upper.min() < self.lower else None
+        )
 
-    def rows(self, problem: Problem) -> Rows:
+    def lengths(self, problem: Problem) -> Lengths:
         """The lengths of the edges over their rest lengths."""
         edges, longest = problem.longest_edges()
         unstretched = StretchLimits.exact(1.0, dim=problem.rest.shape[-1])
         rest = replace(problem, limits=unstretched).longest_edges()[1] if len(edges) else longest
         ends = np.array([1.0, -1.0]) / rest[:, None]
-        return Rows(edges, ends, np.full(len(edges), self.lower), longest / rest)
+        return Lengths(edges, ends, np.full(len(edges), self.lower), longest / rest)
 
     def solve(
         self,

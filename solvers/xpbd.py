@@ -30,35 +30,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
+from strainbench.problem.leverage import Leverage
+from strainbench.problem.rows import Rows, add_row, row
 from strainbench.solver.memory import Memory
+
+Mesh = tuple[Rows, Leverage]
 
 ROWS_A_CHUNK = 3_000_000
 """Row visits between two looks at the clock: 30 ms at the 10 ns a visit measured."""
-
-NO_LEVERAGE = 1e-24
-"""A row with sum_k w_k g_k^2 below this part of what all vertices would give cannot be moved."""
-
-
-class Rows(NamedTuple):
-    """The rows of G, the same for all frames.
-
-    vertices : (rows, k); coefficients : (rows, k), g [1/m]; moves : (rows, k), w g;
-    leverage : (rows,) sum_k w_k g_k^2, 0 where no free vertex can change the row;
-    corners : k zeros; its length is known to the compiler, which unrolls loops.
-    """
-
-    vertices: Any
-    coefficients: Any
-    moves: Any
-    leverage: Any
-    corners: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -99,18 +84,17 @@ class Xpbd(Solver):
         if not 0 <= self.compliance < float("inf"):
             raise ValueError(f"compliance is {self.compliance}: a number of at least 0 is valid")
 
-    def prepare(self, problem: Problem) -> Memory[Rows]:
+    def prepare(self, problem: Problem) -> Memory[Mesh]:
         """Coefficients, and the compiled loops."""
-        G, g = rows(problem), np.zeros(problem.rows)
-        x = problem.target.copy()
-        sweep(G, problem.bounds, x, g, 0.0, self.clamped, 1.0, 0)
-        largest_violation(G, problem.bounds, x)
-        return Memory(G, self.warm)
+        G = Rows.of(problem)
+        levers, l = Leverage.of(problem), np.zeros(problem.rows)  # noqa: E741
+        sweep(G, levers, problem.bounds, problem.target.copy(), l, 0.0, self.clamped, 1.0, 0)
+        return Memory((G, levers), self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Memory[Rows],
+        state: Memory[Mesh],
         *,
         tolerance: float,
         monitor: Callable[..., None],
@@ -124,7 +108,7 @@ class Xpbd(Solver):
     def relax(
         self,
         problem: Problem,
-        G: Rows,
+        mesh: Mesh,
         x: FloatArray,
         multipliers: FloatArray,
         tolerance: float,
@@ -134,10 +118,10 @@ class Xpbd(Solver):
         """Sweeps from any x (n, 3) and l (rows,), both changed in place."""
         b, l, done, mark = problem.bounds, multipliers, 0, 1  # noqa: E741
         chunk = max(1, ROWS_A_CHUNK // problem.rows)
-        settings = (self.compliance, self.clamped, float(tolerance))
+        a, clamped, enough = self.compliance, self.clamped, float(tolerance)
         status = ""
         while not status:
-            if largest_violation(G, b, x) < tolerance:  # 4
+            if problem.violations(x).max() < tolerance:  # 4
                 status = "solved"
             elif done >= self.max_sweeps:
                 status = "iteration limit"
@@ -145,69 +129,42 @@ class Xpbd(Solver):
                 status = "time limit"
             else:
                 sweeps = min(mark - done, chunk, self.max_sweeps - done)
-                done += sweep(G, b, x, l, *settings, sweeps)
+                done += sweep(*mesh, b, x, l, a, clamped, enough, sweeps)
             if done == mark:
                 monitor(x.copy(), iterations=done)
                 mark *= 2
         return Solution(x, status, done, 2 * l[:, None] * (problem.G @ x))
 
 
-def rows(problem: Problem) -> Rows:
-    """What the loops need of the mesh."""
-    w = np.zeros(problem.vertices)
-    w[problem.free] = 1 / problem.weights[problem.free]
-    g, vertices = problem.row_coefficients, problem.row_vertices
-    moves = w[vertices] * g
-    leverage = np.sum(moves * g, axis=1)
-    fixed = leverage <= NO_LEVERAGE * np.sum(g**2 / problem.weights[vertices], axis=1)
-    leverage[fixed] = 0.0
-    return Rows(vertices.astype(np.int32), g, moves, leverage, (0,) * g.shape[1])
-
-
 @compiled
-def sweep(G, b, x, l, compliance, clamped, tolerance, sweeps):  # type: ignore[no-untyped-def]  # noqa: E741
+def sweep(
+    G: Rows,
+    levers: Leverage,
+    b: FloatArray,
+    x: FloatArray,
+    l: FloatArray,  # noqa: E741
+    compliance: float,
+    clamped: bool,
+    tolerance: float,
+    sweeps: int,
+) -> int:
     """Steps 1 to 3 on x and l in place, so often, or until nothing is violated by `tolerance`."""
     for number in range(sweeps):
         worst = 0.0
         for i in range(len(b)):
-            y0, y1, y2 = stretch(G, i, x)
-            square, limit = y0 * y0 + y1 * y1 + y2 * y2, b[i] * b[i]
-            if G.leverage[i] == 0 or (square <= limit and not (clamped and l[i] > 0)):  # 1
+            y0, y1, y2 = row(G, i, 0, x)
+            square, limit, L = y0 * y0 + y1 * y1 + y2 * y2, b[i] * b[i], levers.total[i]
+            if L == 0 or (square <= limit and not (clamped and l[i] > 0)):  # 1
                 continue
             C = square - limit
             worst = max(worst, C / (2 * b[i]))
-            a = 4 * limit * G.leverage[i] * compliance
-            dl = (C - a * l[i]) / (4 * square * G.leverage[i] + a)  # 2
+            a = 4 * limit * L * compliance
+            dl = (C - a * l[i]) / (4 * square * L + a)  # 2
             if clamped:
                 dl = max(dl, -l[i])
             l[i] += dl  # 3
-            for j in range(len(G.corners)):
-                v, s = G.vertices[i, j], 2 * G.moves[i, j] * dl
-                x[v, 0] -= s * y0
-                x[v, 1] -= s * y1
-                x[v, 2] -= s * y2
+            s = -2 * dl
+            add_row(G, levers.moves, i, 0, (s * y0, s * y1, s * y2), x)
         if worst < tolerance:
             return number + 1
     return sweeps
-
-
-@compiled
-def stretch(G, i, x):  # type: ignore[no-untyped-def]
-    """Return y of row i."""
-    y0 = y1 = y2 = 0.0
-    for j in range(len(G.corners)):
-        v, g = G.vertices[i, j], G.coefficients[i, j]
-        y0 += g * x[v, 0]
-        y1 += g * x[v, 1]
-        y2 += g * x[v, 2]
-    return y0, y1, y2
-
-
-@compiled
-def largest_violation(G, b, x):  # type: ignore[no-untyped-def]
-    """Largest max(0, |y_i| - b_i); nothing moves."""
-    worst = 0.0
-    for i in range(len(b)):
-        y0, y1, y2 = stretch(G, i, x)
-        worst = max(worst, np.sqrt(y0 * y0 + y1 * y1 + y2 * y2) - b[i])
-    return worst

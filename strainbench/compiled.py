@@ -12,14 +12,28 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import ParamSpec, TypeVar, cast, overload
 
 from numba import config, njit
 
 from strainbench.sources import closure, digest
 
+P = ParamSpec("P")
+R = TypeVar("R")
+Kernel = Callable[P, R]
 
-def compiled(function: Callable[..., Any] | None = None, *, error_model: str = "python") -> Any:
+
+@overload
+def compiled(function: Kernel[P, R]) -> Kernel[P, R]: ...
+
+
+@overload
+def compiled(*, error_model: str) -> Callable[[Kernel[P, R]], Kernel[P, R]]: ...
+
+
+def compiled(
+    function: Kernel[P, R] | None = None, *, error_model: str = "python"
+) -> Kernel[P, R] | Callable[[Kernel[P, R]], Kernel[P, R]]:
     """Compile `function` by numba on its first call, and keep the machine code on disk.
 
     Parameters
@@ -27,11 +41,15 @@ def compiled(function: Callable[..., Any] | None = None, *, error_model: str = "
     error_model : "python" raises ZeroDivisionError, "numpy" gives inf or NaN.
     """
     if function is None:
-        return lambda f: compiled(f, error_model=error_model)
+        return lambda f: _compiled(f, error_model)
+    return _compiled(function, error_model)
+
+
+def _compiled(function: Kernel[P, R], error_model: str) -> Kernel[P, R]:
     before = config.CACHE_DIR
     config.CACHE_DIR = str(cache_folder(Path(inspect.getfile(function)), before))
     try:
-        return njit(cache=True, error_model=error_model)(function)
+        return cast(Kernel[P, R], njit(cache=True, error_model=error_model)(function))
     finally:
         config.CACHE_DIR = before
 

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from solvers.admm.anderson import Anderson
-from solvers.admm.rows import Rows
+from solvers.admm.steps import Steps
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.solver.memory import Memory
@@ -95,14 +95,14 @@ class Admm(Solver):
         if not 0 < self.relaxation < 2:
             raise ValueError(f"relaxation is {self.relaxation}: a number between 0 and 2 is valid")
 
-    def prepare(self, problem: Problem) -> Memory[Rows]:
+    def prepare(self, problem: Problem) -> Memory[Steps]:
         """Sparsity, ordering, and the compiled loops."""
-        return Memory(Rows(problem), self.warm)
+        return Memory(Steps(problem), self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Memory[Rows],
+        state: Memory[Steps],
         *,
         tolerance: float,
         monitor: Callable[..., None],
@@ -128,9 +128,9 @@ class Iteration:
     """
 
     def __init__(
-        self, method: Admm, problem: Problem, rows: Rows, x: FloatArray, multipliers: FloatArray
+        self, method: Admm, problem: Problem, steps: Steps, x: FloatArray, multipliers: FloatArray
     ) -> None:
-        self.method, self.problem, self.rows = method, problem, rows
+        self.method, self.problem, self.steps = method, problem, steps
         self.stretched: FloatArray = problem.G @ problem.target
         self.x = x.copy()
         self.z: FloatArray = problem.G @ x
@@ -171,13 +171,13 @@ class Iteration:
 
     def _project(self, v: FloatArray) -> FloatArray:
         """Each constraint's rows moved to the closest within its bound."""
-        return self.rows.project(v, self.problem.bounds)
+        return self.steps.project(v, self.problem.bounds)
 
     def _solve_for_positions(self) -> None:
         """(M + G^T W G) (x - target) = G^T W (z - u - G target) on the free vertices."""
-        pull = self.rows.pull(self.w, self.v, self.z, self.stretched)
+        pull = self.steps.pull(self.w, self.v, self.z, self.stretched)
         free = self.problem.free
-        self.x[free] = self.problem.target[free] + self.rows.linear.solve(pull[free])
+        self.x[free] = self.problem.target[free] + self.steps.linear.solve(pull[free])
 
     def _converged(self, tolerance: float) -> bool:
         """Whether the violation and the gap relative to the dual value of Y are below it.
@@ -207,9 +207,9 @@ class Iteration:
     def _weigh(self, rho: FloatArray, multipliers: FloatArray) -> None:
         """New weights and factor for the same z and multipliers."""
         self.rho = rho
-        self.w = np.repeat(rho / self.rows.compliance, self.rows.group)
+        self.w = np.repeat(rho / self.steps.compliance, self.steps.group)
         self.v = self.z + multipliers / self.w[:, None]
-        self.rows.factorise(self.w)
+        self.steps.factorise(self.w)
 
     def _reweigh(self, step: FloatArray) -> bool:
         """Choose new weights; whether they differ enough to be taken."""
@@ -229,7 +229,7 @@ class Iteration:
 
     def _bound_rho(self) -> FloatArray:
         """The bound's best common rho, for rows that share it by the roots of their multipliers."""
-        root = np.sqrt(self.rows.compliance)
+        root = np.sqrt(self.steps.compliance)
         dual = self._norms(self.multipliers) * root
         moved = self._norms(self.z - self.stretched) / root
         if not dual.any():

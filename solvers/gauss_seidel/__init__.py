@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from solvers.gauss_seidel.elements import Elements, refusal
-from solvers.gauss_seidel.rows import Rows
+from solvers.gauss_seidel.rows import Directions
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.solver.memory import Memory
 
@@ -69,17 +69,19 @@ class GaussSeidel(Solver):
         """A reason, where the limits cannot be put as limits on what one step corrects."""
         return super().supports(problem) or refusal(self.constraint, problem)
 
-    def prepare(self, problem: Problem) -> Memory[Rows | Elements]:
+    def prepare(self, problem: Problem) -> Memory[Directions | Elements]:
         """What a step needs that does not depend on the positions, and the compiled loops."""
         by_rows = self.constraint == "directions"
-        mesh = Rows.of(problem) if by_rows else Elements.of(problem, self.constraint == "strain")
+        mesh = (
+            Directions.of(problem) if by_rows else Elements.of(problem, self.constraint == "strain")
+        )
         mesh.sweep(problem, problem.target.copy(), 1.0, 0)
         return Memory(mesh, self.warm)
 
     def solve(
         self,
         problem: Problem,
-        state: Memory[Rows | Elements],
+        state: Memory[Directions | Elements],
         *,
         tolerance: float,
         monitor: Callable[..., None],

@@ -104,7 +104,7 @@ class Elements:
         arrays = (self.vertices, self.gradients, self.levers, self.directions, self.columns)
         count = len(self.vertices)
         bounds = (problem.bounds.reshape(count, -1), problem.lower_bounds.reshape(count, -1))
-        return int(sweep_elements(*arrays, *bounds, x, float(tolerance), sweeps))
+        return sweep_elements(*arrays, *bounds, x, float(tolerance), sweeps)
 
 
 def levers_of(problem: Problem, gradients: FloatArray, strain: bool) -> FloatArray:
@@ -125,9 +125,18 @@ def levers_of(problem: Problem, gradients: FloatArray, strain: bool) -> FloatArr
 
 
 @compiled
-def sweep_elements(  # type: ignore[no-untyped-def]
-    vertices, gradients, levers, directions, columns, bounds, lower, x, tolerance, sweeps
-):
+def sweep_elements(
+    vertices: NDArray[np.int32],
+    gradients: FloatArray,
+    levers: FloatArray,
+    directions: FloatArray,
+    columns: NDArray[np.int64],
+    bounds: FloatArray,
+    lower: FloatArray,
+    x: FloatArray,
+    tolerance: float,
+    sweeps: int,
+) -> int:
     """Take steps 1 to 4 on `x` in place, and return the number of sweeps done.
 
     It stops early after a sweep that found no limit violated by `tolerance`.

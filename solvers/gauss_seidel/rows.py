@@ -12,74 +12,51 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-
-NO_LEVERAGE = 1e-12
-"""Coefficients smaller than this beside the row's largest are rounding, and move nothing."""
+from strainbench.problem.leverage import Leverage
+from strainbench.problem.rows import Rows, add_row, row
 
 
 @dataclass(frozen=True)
-class Rows:
-    """The rows of G as contiguous arrays.
+class Directions:
+    """The rows of G, and (rows, 1, k) steps w_k g_k / sum_j w_j g_j^2 [m], 0 where none moves."""
 
-    vertices : (rows, k); coefficients : (rows, k), g [1/m];
-    steps : (rows, k), w_k g_k / sum_j w_j g_j^2 [m], 0 where all vertices are pinned;
-    corners : k zeros; its length is known to the compiler, which then unrolls the loops over k.
-    """
-
-    vertices: NDArray[np.int32]
-    coefficients: FloatArray
+    G: Rows
     steps: FloatArray
-    corners: tuple[int, ...]
 
     @classmethod
-    def of(cls, problem: Problem) -> Rows:
-        """The rows of a problem."""
-        g = problem.row_coefficients
-        corners = (0,) * g.shape[1]
-        return cls(problem.row_vertices.astype(np.int32), g, step_factors(problem), corners)
+    def of(cls, problem: Problem) -> Directions:
+        """Those of a problem."""
+        levers = Leverage.of(problem)
+        return cls(Rows.of(problem), levers.moves * levers.steps[:, None, None])
 
     def sweep(self, problem: Problem, x: FloatArray, tolerance: float, sweeps: int) -> int:
         """Sweeps done on `x` (n, 3), in place: as many as asked, or until one is calm."""
-        arrays = (self.vertices, self.coefficients, self.steps, self.corners)
         bounds = problem.bounds, problem.lower_bounds
-        return int(sweep_rows(*arrays, *bounds, x, float(tolerance), sweeps))
-
-
-def step_factors(problem: Problem) -> FloatArray:
-    """(rows, k) w_k g_k / sum_j w_j g_j^2 [m], or 0 in rows that no free vertex can change."""
-    w = np.zeros(problem.vertices)
-    w[problem.free] = 1 / problem.weights[problem.free]
-    g = problem.row_coefficients
-    g = np.where(np.abs(g) > NO_LEVERAGE * np.abs(g).max(axis=1, keepdims=True), g, 0.0)
-    wg = w[problem.row_vertices] * g
-    total = np.sum(wg * g, axis=1, keepdims=True)
-    steps = np.zeros_like(wg)
-    np.divide(wg, total, out=steps, where=total > 0)
-    return steps
+        return sweep_rows(self.G, self.steps, *bounds, x, float(tolerance), sweeps)
 
 
 @compiled
-def sweep_rows(  # type: ignore[no-untyped-def]
-    vertices, coefficients, steps, corners, bounds, lower, x, tolerance, sweeps
-):
+def sweep_rows(
+    G: Rows,
+    steps: FloatArray,
+    bounds: FloatArray,
+    lower: FloatArray,
+    x: FloatArray,
+    tolerance: float,
+    sweeps: int,
+) -> int:
     """Take steps 1 and 2 on `x` in place, and return the number of sweeps done.
 
     It stops early after a sweep that found no row violated by `tolerance`.
     """
     for sweep in range(sweeps):
         worst = 0.0
-        for i in range(len(vertices)):
-            y0 = y1 = y2 = 0.0
-            for j in range(len(corners)):
-                v, g = vertices[i, j], coefficients[i, j]
-                y0 += g * x[v, 0]
-                y1 += g * x[v, 1]
-                y2 += g * x[v, 2]
+        for i in range(len(bounds)):
+            y0, y1, y2 = row(G, i, 0, x)
             square = y0 * y0 + y1 * y1 + y2 * y2
             bound = bounds[i]
             if square <= bound * bound:  # 1
@@ -91,11 +68,8 @@ def sweep_rows(  # type: ignore[no-untyped-def]
             worst = max(worst, abs(excess))
             if length == 0:  # no direction to stretch it in
                 continue
-            for j in range(len(corners)):  # 2
-                v, s = vertices[i, j], steps[i, j] * (excess / length)
-                x[v, 0] -= s * y0
-                x[v, 1] -= s * y1
-                x[v, 2] -= s * y2
+            s = -excess / length  # 2
+            add_row(G, steps, i, 0, (s * y0, s * y1, s * y2), x)
         if worst < tolerance:
             return sweep + 1
     return sweeps

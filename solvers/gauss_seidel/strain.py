@@ -11,15 +11,19 @@ half difference of S_xx and S_yy, then these by |S e_x|^2 = S_xx^2 + S_xy^2 and 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
+
+Vector = tuple[float, float, float]
 
 FLAT = 1e-12
 """Singular values smaller than this beside the larger one are rounding, without a direction."""
 
 
 @compiled
-def polar(F):  # type: ignore[no-untyped-def]
+def polar(F: FloatArray) -> tuple[float, float, float, float]:
     """Singular values s1 >= s2 of F (3, 2) and its first right vector (c, s); F becomes R.
 
     V is in closed form; F v2 is made orthogonal to F v1 again, so that s2 is as accurate as s1,
@@ -48,7 +52,7 @@ def polar(F):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def unit(y, normal, least):  # type: ignore[no-untyped-def]
+def unit(y: Vector, normal: Vector, least: float) -> tuple[float, Vector]:
     """Length and direction of y; any direction orthogonal to `normal` where it is too short."""
     length = np.sqrt(y[0] * y[0] + y[1] * y[1] + y[2] * y[2])
     if length > least:
@@ -65,16 +69,24 @@ def unit(y, normal, least):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def symmetric(first, second, c, s):  # type: ignore[no-untyped-def]
+def symmetric(first: float, second: float, c: float, s: float) -> Vector:
     """Entries xx, yy, xy of V diag(first, second) V^T."""
     return first * c * c + second * s * s, first * s * s + second * c * c, (first - second) * c * s
 
 
 @compiled
-def violation(s1, s2, c, s, directions, bounds, lower):  # type: ignore[no-untyped-def]
+def violation(
+    s1: float,
+    s2: float,
+    c: float,
+    s: float,
+    directions: FloatArray,
+    bounds: FloatArray,
+    lower: FloatArray,
+) -> float:
     """Largest violation of a triangle's own limits."""
     if len(directions) == 0:
-        return s1 - bounds[0]
+        return s1 - float(bounds[0])
     worst = 0.0
     for j in range(len(directions)):
         along = directions[j, 0] * c + directions[j, 1] * s
@@ -85,7 +97,15 @@ def violation(s1, s2, c, s, directions, bounds, lower):  # type: ignore[no-untyp
 
 
 @compiled
-def strain_change(s1, s2, c, s, columns, bounds, lower):  # type: ignore[no-untyped-def]
+def strain_change(
+    s1: float,
+    s2: float,
+    c: float,
+    s: float,
+    columns: NDArray[np.int64],
+    bounds: FloatArray,
+    lower: FloatArray,
+) -> Vector:
     """Entries xx, yy, xy of the change that clamps the strain to the limits."""
     xx, yy, xy = symmetric(s1, s2, c, s)
     b0, l0 = room(columns[0], bounds, lower)
@@ -104,12 +124,12 @@ def strain_change(s1, s2, c, s, columns, bounds, lower):  # type: ignore[no-unty
 
 
 @compiled
-def room(column, bounds, lower):  # type: ignore[no-untyped-def]
+def room(column: int, bounds: FloatArray, lower: FloatArray) -> tuple[float, float]:
     """Largest and least stretch along one of ENTRIES."""
     return (bounds[column], lower[column]) if column >= 0 else (np.inf, 0.0)
 
 
 @compiled
-def leg(hypotenuse, other):  # type: ignore[no-untyped-def]
+def leg(hypotenuse: float, other: float) -> float:
     """The other leg of a right triangle, 0 where there is none."""
-    return np.sqrt(max(0.0, hypotenuse * hypotenuse - other * other))
+    return float(np.sqrt(max(0.0, hypotenuse * hypotenuse - other * other)))

@@ -67,7 +67,7 @@ import numpy as np
 
 from solvers.newton_ipm.infeasible import infeasible_multipliers
 from solvers.newton_ipm.iterate import STRICTER, Iterate, State
-from solvers.newton_ipm.sampled import ROUNDING
+from solvers.newton_ipm.mesh import ROUNDING
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import NotPositiveDefiniteError

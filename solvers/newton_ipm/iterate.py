@@ -6,7 +6,6 @@ import numpy as np
 
 from solvers.newton_ipm.exact import ExactCones
 from solvers.newton_ipm.mesh import Change
-from solvers.newton_ipm.sampled import ROUNDING as LOST
 from solvers.newton_ipm.sampled import SampledCones
 from strainbench import Problem
 from strainbench.arrays import FloatArray
@@ -71,7 +70,10 @@ class Iterate:
         self.infeasible = False
         self.x = problem.target
         self.cones.place(problem.bounds, self.x)
-        self.y_target, self.violations = self.cones.y, np.maximum(self.cones.excess(), 0.0)
+        self.y_target, self.violations = (
+            self.cones.at.y.copy(),
+            np.maximum(self.cones.excess(), 0.0),
+        )
 
     def start(self) -> None:
         """From the target, with products of a guess: the violation over the size of the mesh."""
@@ -94,62 +96,60 @@ class Iterate:
 
     def measure(self) -> float:
         """The larger of relative gap at x, the violations priced in, and STRICTER violations."""
-        cones, free = self.cones, self.free
-        self.Y, norms = cones.multipliers()
-        pull = cones.back(self.Y)
+        self.Y, pull = np.empty((self.problem.rows, 3)), np.zeros_like(self.x)
+        most, linear, price, beyond, worst = self.cones.measure(self.y_target, self.Y, pull)
         self.r_d = self.weights * (self.x - self.target) + pull
-        excess = cones.excess()
         self.objective = objective = self.problem.objective(self.x)
-        most = float(cones.b @ norms)
-        linear = float(np.sum(self.Y * self.y_target)) - most * (1 + ROUNDING)
-        square = float(np.sum(pull[free] ** 2 / self.weights[free]))
+        linear -= most * (1 + ROUNDING)
+        square = float(np.sum(pull[self.free] ** 2 / self.weights[self.free]))
         bound = 0.5 * linear**2 / square if linear > 0 < square else 0.0
         self.infeasible = bound > objective and bound > self.problem.largest_objective
-        price, scale = float(norms @ np.maximum(excess, 0.0)), max(bound, self.floor)
+        scale = max(bound, self.floor)
         self.priced = objective - bound + price
-        self.gap = max(0.0, self.priced) / scale
-        self.violation = float(np.max(excess))
-        error = max(STRICTER * self.violation, self.gap)
-        if most < LARGE * scale:
-            return error
-        beyond = np.maximum(excess - 2 * LOST, 0.0)
-        return max(error, STRICTER * float(norms @ beyond) / scale)
+        self.gap, self.violation = max(0.0, self.priced) / scale, worst
+        error = max(STRICTER * worst, self.gap)
+        return error if most < LARGE * scale else max(error, STRICTER * beyond / scale)
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
         cones, pattern = self.cones, self.state.pattern
         data = np.zeros(len(pattern.indices))
         pattern.add_diagonal(data, self.problem.weights)
-        cones.assemble(data)
+        total = cones.assemble(data)
         self.state.linear.factorise(data)  # 3
-        total, r = cones.products(), cones.residuals()
-        mu = total / cones.degree
+        mean = total / cones.degree
         if self.keep and self.gap < SNAPSHOT and self.violation < SNAPSHOT:
-            self._snapshot(*self._direction(cones.corrector(mu), r))
-        _, affine = self._direction(cones.predictor(), r)
-        ratio = cones.products(affine, affine.length) / total
-        enough = AIM * self.tolerance * max(self.objective, self.floor)
-        least = min(total, max(enough, LEAST_SIGMA * self.priced)) / cones.degree
-        mu = max(mu * max(ratio**EXPONENT, LEAST_SIGMA), least)
-        r = r - affine.square
-        c = cones.corrector(mu, affine)  # 4
-        dx, change = self._direction(c, r)
+            cones.aim(mean)
+            self._snapshot(*self._direction())
+        cones.aim(0.0)
+        _, affine = self._direction()
+        mu = self._next_mu(total, affine)
+        cones.aim(mu, affine)  # 4
+        dx, change = self._direction()
         for _ in range(CORRECTORS):  # 5
             longer = min(1.0, change.length + LONGER)
-            c = cones.centrality(c, change, longer, LOW * mu, HIGH * mu)
-            dx_new, new = self._direction(c, r)
+            cones.centre(change, longer, LOW * mu, HIGH * mu)
+            dx_new, new = self._direction()
             if new.length < change.length + GROWTH * (longer - change.length):
                 break
             dx, change = dx_new, new
         a = min(1.0, BACK_OFF * change.length)  # 6
         self.x = self.x + a * dx
-        cones.s, cones.l = cones.moved(change, a)
+        cones.put(*cones.moved(change, a))
         cones.place(self.problem.bounds, self.x)
 
-    def _direction(self, c: FloatArray, r: FloatArray) -> tuple[FloatArray, Change]:
+    def _next_mu(self, total: float, affine: Change) -> float:
+        """The mean product to aim at, where <s, l> is `total` and the predictor would go so far."""
+        a, degree = affine.length, self.cones.degree
+        ratio = 1 + (a * affine.first + a * a * affine.second) / total
+        enough = AIM * self.tolerance * max(self.objective, self.floor)
+        least = min(total, max(enough, LEAST_SIGMA * self.priced)) / degree
+        return max(total / degree * max(ratio**EXPONENT, LEAST_SIGMA), least)
+
+    def _direction(self) -> tuple[FloatArray, Change]:
         """One solve with the factor at hand: dx (n, 3), ds and dl."""
-        force = self.r_d + self.cones.push(c, r)
-        dx = np.zeros_like(force)
+        force, dx = self.r_d.copy(), np.zeros_like(self.r_d)
+        self.cones.push(force)
         dx[self.free] = self.state.linear.solve(-force[self.free].ravel()).reshape(-1, 3)
         return dx, self.cones.change(dx)
 

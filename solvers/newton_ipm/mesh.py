@@ -1,17 +1,19 @@
-"""What both kinds of limits share: a step, and what an element adds to sums over the mesh.
+"""What both kinds of limits share: a step, and what an element adds to the matrix.
 
 The functions are compiled into the loops that call them.
-
-`corners` and `axes` are tuples of k and dim zeros: their lengths are known to the compiler, which
-then unrolls the loops over an element's vertices and material axes.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from strainbench.arrays import FloatArray
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
+from strainbench.problem.rows import Rows
+
+ROUNDING = 1e-14
+"""Residuals below it count as 0: divided by small slacks, rounding would floor the gap."""
 
 
 @dataclass(frozen=True)
@@ -21,55 +23,68 @@ class Change:
     s, l : of slacks and multipliers
     square : dy dy^T / 2, by which slacks fall short of their linearisation
     length : the part of the step that reaches the boundary, at most 1
+    first, second : the sum of products after the part a grows by a first + a^2 second
     """
 
     s: FloatArray
     l: FloatArray  # noqa: E741
     square: FloatArray
     length: float
+    first: float
+    second: float
 
 
-@compiled
-def gather(elements, gradients, corners, axes, e, x, F):  # type: ignore[no-untyped-def]
-    """F (dim, 3) = sum_a B_a x_a^T of element e."""
-    for c in range(len(axes)):
-        f0 = f1 = f2 = 0.0
-        for a in range(len(corners)):
-            v, B = elements[e, a], gradients[e, a, c]
-            f0 += B * x[v, 0]
-            f1 += B * x[v, 1]
-            f2 += B * x[v, 2]
-        F[c, 0], F[c, 1], F[c, 2] = f0, f1, f2
+class Sums(NamedTuple):
+    """Over all constraints, with norms |Y_i| and excess |y_i| - b_i.
 
-
-@compiled
-def spread(elements, gradients, corners, axes, e, P, out):  # type: ignore[no-untyped-def]
-    """Add sum_c B_ac P_c, of P (dim, 3), to each vertex a of element e in `out` (n, 3)."""
-    for a in range(len(corners)):
-        v = elements[e, a]
-        for c in range(len(axes)):
-            B = gradients[e, a, c]
-            for i in range(3):
-                out[v, i] += B * P[c, i]
-
-
-@compiled
-def spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data):  # type: ignore[no-untyped-def]
-    """Add sum_cf B_ac B_bf H_cf, of H (dim, dim, 3, 3), to the block of each vertex pair a, b.
-
-    `slots`, `stride` and `data` are those of `strainbench.physics.pattern.Pattern`.
+    most, linear : sum of b |Y|, and of <Y, G target>
+    price, beyond : sum of |Y| times the excess, and times that beyond twice ROUNDING
+    worst : the largest excess, or NaN where one is
     """
-    for b in range(len(corners)):
-        width = stride[elements[e, b]]
-        for a in range(len(corners)):
-            first = slots[e, a, b]
+
+    most: float
+    linear: float
+    price: float
+    beyond: float
+    worst: float
+
+
+class Slots(NamedTuple):
+    """Where blocks go: (e, k, k) and (n,) of `strainbench.physics.pattern.Pattern`."""
+
+    slots: IntArray
+    stride: IntArray
+
+
+@compiled
+def add_sums(sums: Sums, b: float, norm: float, excess: float, linear: float) -> Sums:
+    """The sums with one constraint more."""
+    price = norm * excess if excess > 0 else 0.0
+    beyond = norm * (excess - 2 * ROUNDING) if excess > 2 * ROUNDING else 0.0
+    worst = excess if excess > sums.worst or excess != excess else sums.worst
+    return Sums(
+        sums.most + b * norm,
+        sums.linear + linear,
+        sums.price + price,
+        sums.beyond + beyond,
+        worst,
+    )
+
+
+@compiled
+def spread_blocks(G: Rows, at: Slots, e: int, H: FloatArray, data: FloatArray) -> None:
+    """Add sum_cf B_ca B_fb H_cf, of H (dim, dim, 3, 3), to the block of each vertex pair a, b."""
+    for b in range(len(G.corners)):
+        width = at.stride[G.vertices[e, b]]
+        for a in range(len(G.corners)):
+            first = at.slots[e, a, b]
             if first < 0:
                 continue
             for j in range(3):
                 k0 = k1 = k2 = 0.0
-                for c in range(len(axes)):
-                    for f in range(len(axes)):
-                        weight = gradients[e, a, c] * gradients[e, b, f]
+                for c in range(len(G.axes)):
+                    for f in range(len(G.axes)):
+                        weight = G.coefficients[e, c, a] * G.coefficients[e, f, b]
                         k0 += weight * H[c, f, 0, j]
                         k1 += weight * H[c, f, 1, j]
                         k2 += weight * H[c, f, 2, j]
@@ -80,23 +95,23 @@ def spread_blocks(elements, gradients, corners, axes, e, H, slots, stride, data)
 
 
 @compiled
-def spread_symmetric(elements, gradients, corners, axes, e, H, slots, stride, data):  # type: ignore[no-untyped-def]
+def spread_symmetric(G: Rows, at: Slots, e: int, H: FloatArray, data: FloatArray) -> None:
     """The same for H_cf = H_fc = H_cf^T, whose entries 00, 01, 02, 11, 12, 22 are H (dim, dim, 6).
 
     Those with f <= c are read.
     """
-    for b in range(len(corners)):
-        width = stride[elements[e, b]]
-        for a in range(len(corners)):
-            first = slots[e, a, b]
+    for b in range(len(G.corners)):
+        width = at.stride[G.vertices[e, b]]
+        for a in range(len(G.corners)):
+            first = at.slots[e, a, b]
             if first < 0:
                 continue
             k0 = k1 = k2 = k3 = k4 = k5 = 0.0
-            for c in range(len(axes)):
+            for c in range(len(G.axes)):
                 for f in range(c + 1):
-                    weight = gradients[e, a, c] * gradients[e, b, f]
+                    weight = G.coefficients[e, c, a] * G.coefficients[e, f, b]
                     if f < c:
-                        weight += gradients[e, a, f] * gradients[e, b, c]
+                        weight += G.coefficients[e, f, a] * G.coefficients[e, c, b]
                     k0 += weight * H[c, f, 0]
                     k1 += weight * H[c, f, 1]
                     k2 += weight * H[c, f, 2]

@@ -7,7 +7,7 @@ import pytest
 
 from solvers.admm import Admm, Iteration
 from solvers.admm.anderson import Anderson
-from solvers.admm.rows import Rows
+from solvers.admm.steps import Steps
 from strainbench import certify, solve
 from strainbench.solver.solver import Clock
 from tests.problem.test_conic import exact
@@ -17,7 +17,7 @@ from tests.problems import random_problem
 def test_balls_are_projected_on(rng):
     problem = random_problem(rng)
     v = rng.normal(size=(problem.rows, 3)) * rng.uniform(0.1, 3, (problem.rows, 1))
-    z = Rows(problem).project(v, problem.bounds)
+    z = Steps(problem).project(v, problem.bounds)
     lengths = np.linalg.norm(v, axis=1)
     expected = v * np.minimum(1, problem.bounds / lengths)[:, None]
     assert z == pytest.approx(expected, abs=1e-14)
@@ -32,18 +32,18 @@ def test_singular_values_are_clamped(rng, equal):
         s[:, 1] = s[:, 0]
         v = (U * s[:, None]) @ Vt
     expected = (U * np.minimum(s, problem.bounds[:, None])[:, None]) @ Vt
-    z = Rows(problem).project(v.reshape(-1, 3), problem.bounds)
+    z = Steps(problem).project(v.reshape(-1, 3), problem.bounds)
     assert z == pytest.approx(expected.reshape(-1, 3), abs=1e-8)
 
 
 def test_the_matrix_is_the_mass_and_the_weighted_rows(rng):
     problem = random_problem(rng, pins=2, mass=True)
-    rows, w = Rows(problem), rng.uniform(0.5, 2, problem.rows)
-    rows.factorise(w)
+    steps, w = Steps(problem), rng.uniform(0.5, 2, problem.rows)
+    steps.factorise(w)
     G = problem.G[:, problem.free].toarray()
     A = np.diag(problem.weights[problem.free]) + G.T @ (w[:, None] * G)
     b = rng.normal(size=(len(A), 3))
-    assert rows.linear.solve(b) == pytest.approx(np.linalg.solve(A, b), rel=1e-8)
+    assert steps.linear.solve(b) == pytest.approx(np.linalg.solve(A, b), rel=1e-8)
 
 
 @pytest.mark.parametrize("fields", [{}, {"memory": 6}, {"weights": "residuals", "relaxation": 1.0}])
@@ -66,7 +66,7 @@ def test_the_iteration_limit_is_not_solved(rng):
 def test_the_optimum_with_its_multipliers_is_where_it_stays():
     problem = random_problem(np.random.default_rng(9), directions=3, limit=0.05)
     cold = solve(problem, "admm", tolerance=1e-8)
-    again = Iteration(Admm(), problem, Rows(problem), cold.positions, cold.multipliers)
+    again = Iteration(Admm(), problem, Steps(problem), cold.positions, cold.multipliers)
     status, iterations = again.run(1e-6, Clock().monitor, Clock())
     assert (status, iterations) == ("solved", 10)
     assert np.abs(again.x - cold.positions).max() < 1e-5 * problem.edge_length

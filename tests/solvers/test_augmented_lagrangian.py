@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.augmented_lagrangian import AugmentedLagrangian, Minimum, blocks, diagonal, product
+from solvers.augmented_lagrangian import AugmentedLagrangian
+from solvers.augmented_lagrangian.minimum import Blocks, Minimum, diagonal, product
 from strainbench import StretchLimits, certify, solve
 from strainbench.solver.solver import Clock
 from tests.problems import own_gap, random_problem, stretched_cube
@@ -20,7 +21,7 @@ def instance(kind):
         problem = random_problem(rng, limit=0.05, directions=4, pins=2, exact=kind == "exact")
     shape = (problem.constraints, -1, 3)
     Y = 1e-3 * problem.edge_length**2 * rng.normal(size=(problem.rows, 3)).reshape(shape)
-    return problem, blocks(problem), Y
+    return problem, Blocks.of(problem), Y
 
 
 def free_part(problem, array):
@@ -43,7 +44,7 @@ def test_gradient_and_hessian_are_those_of_the_value(kind):
     slope = (at(h).value - at(-h).value) / (2 * h)
     assert np.sum(here.gradient * p) == pytest.approx(slope, rel=1e-6)
     found = np.empty_like(p)
-    product(*here.hessian, p, found)
+    product(here.hessian, p, found)
     expected = (at(h).gradient - at(-h).gradient) / (2 * h)
     assert found == pytest.approx(expected, abs=1e-6 * np.abs(expected).max())
 
@@ -52,12 +53,12 @@ def test_gradient_and_hessian_are_those_of_the_value(kind):
 def test_the_preconditioner_is_the_diagonal(kind):
     problem, G, Y = instance(kind)
     here = Minimum(G, problem, Y, 10.0, problem.target)
-    found, column = diagonal(*here.hessian), np.empty_like(problem.target)
+    found, column = diagonal(here.hessian), np.empty_like(problem.target)
     for vertex in problem.free[:5]:
         for c in range(3):
             unit = np.zeros_like(problem.target)
             unit[vertex, c] = 1.0
-            product(*here.hessian, unit, column)
+            product(here.hessian, unit, column)
             assert found[vertex, :, c] == pytest.approx(column[vertex], rel=1e-9, abs=1e-9)
     assert np.array_equal(found[problem.pinned], np.tile(np.eye(3), (len(problem.pinned), 1, 1)))
 

@@ -372,7 +372,8 @@ def test_the_matrix_is_the_derivative_of_the_condition_that_it_solves(exact):
         """Of 1/2 ||x - target||_M^2 - mu log det of the slacks."""
         cones.place(problem.bounds, moved)
         cones.start(0.0, mu)
-        pull = cones.back(cones.multipliers()[0])
+        Y, pull = np.zeros((problem.rows, 3)), np.zeros_like(moved)
+        cones.measure(Y, Y, pull)
         return (problem.weights[:, None] * (moved - problem.target) + pull)[free].ravel()
 
     expected = central_difference(gradient, x, 1e-5 * problem.edge_length)[:, free].reshape(
@@ -411,3 +412,33 @@ def test_iterates_do_not_depend_on(change, exact):
         expected = 1000 * first
     found = iterate_of(other, 6).x
     assert found == pytest.approx(expected, abs=1e-7 * np.ptp(expected))
+
+
+FRAMES = {  # iterations, cold and warm
+    "sampled": ([21, 21, 20, 22, 21], [21, 6, 5, 7, 9]),
+    "exact": ([15, 16, 16, 17, 17], [15, 5, 5, 5, 6]),
+}
+ITERATIONS = {  # of each candidate within 1%
+    "sampled": [22, 30, 41, 29, 18, 28, 22, 30, 43, 50],
+    "exact": [24, 25, 35, 32, 16, 25, 24, 29, 41, 60],
+}
+
+
+@pytest.mark.parametrize("warm", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_frames_take_as_many_iterations_as_ever(kind, warm):
+    problem, solver, found = sheet(kind, 1e-2), NewtonIPM(warm=warm), []
+    state = solver.prepare(problem)
+    for frame in range(5):
+        target = problem.target * [1, 1, 1 + 0.01 * frame]
+        target[problem.pinned] = problem.target[problem.pinned]
+        solution = run_solver(solver, problem.with_target(target), state, TOLERANCE)
+        found.append(solution.iterations)
+    assert found == FRAMES[kind][warm]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_candidates_take_as_many_iterations_as_ever(kind):
+    """Within one: far from the limits the last ones are rounding's."""
+    found = [answer(sheet(kind, 1e-2, make)).iterations for make in CANDIDATES.values()]
+    assert found == pytest.approx(ITERATIONS[kind], abs=1)

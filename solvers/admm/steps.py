@@ -1,4 +1,4 @@
-"""The rows of G as compiled loops see them, and matrices M + G^T W G."""
+"""Steps 1 and 2 of ADMM: projections on the limits, and matrices M + G^T W G."""
 
 from __future__ import annotations
 
@@ -9,47 +9,34 @@ from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
 from strainbench.physics.linear import SuperLU
+from strainbench.problem.leverage import Leverage, Pairs
+from strainbench.problem.rows import Rows, add_row
 
 
-class Rows:
-    """The rows of G, and a solver for matrices M + G^T W G.
+class Steps:
+    """Projections of each constraint's rows, and a solver for matrices M + G^T W G.
 
     Attributes
     ----------
-    vertices, coefficients : (rows, k) of G [1/m]
+    G : the rows of G
     compliance : (constraints,) g_i M^-1 g_i, the mean over an element's rows for exact limits
     group : rows of G in a constraint
     """
 
     def __init__(self, problem: Problem) -> None:
-        self._vertices = problem.vertices
-        self.vertices, self.coefficients = problem.row_vertices, problem.row_coefficients
-        self.group = problem.rows // problem.constraints
-        inverse = np.zeros(problem.vertices)
-        inverse[problem.free] = 1 / problem.weights[problem.free]
-        g = self.coefficients
-        compliance = np.sum(g**2 * inverse[self.vertices], axis=1)
-        compliance = compliance.reshape(-1, self.group).mean(axis=1)
+        self.G, self._vertices = Rows.of(problem), problem.vertices
+        self.group = len(self.G.axes)
+        moves = Leverage.of(problem).moves
+        compliance = np.sum(moves * self.G.coefficients, axis=2).mean(axis=1)
         idle = compliance <= 1e-12 * compliance.max()  # all pinned: any weight will do
         self.compliance = np.where(idle, compliance.max(), compliance)
-
         n = len(problem.free)
-        unknown = np.full(problem.vertices, -1)
-        unknown[problem.free] = np.arange(n)
-        a, b = np.tril_indices(g.shape[1])
-        ends = unknown[self.vertices[:, [a, b]]]
-        column, row = ends.min(axis=1), ends.max(axis=1)
-        i, pair = np.nonzero(column >= 0)
-        keys = np.concatenate([(column * n + row)[i, pair], np.arange(n) * (n + 1)])
-        found, index = np.unique(keys, return_inverse=True)
-        shape = len(found), problem.rows
-        entries = (g[:, a] * g[:, b])[i, pair]
-        self._products = sp.csr_array((entries, (index[: len(i)], i)), shape=shape)
-        self._mass = np.zeros(len(found))
-        self._mass[index[len(i) :]] = problem.weights[problem.free]
-        starts = np.searchsorted(found, n * np.arange(n + 1))
+        pairs = Pairs(problem, problem.row_vertices, problem.row_coefficients)
+        self._products, self._mass = pairs.products, np.zeros(len(pairs.rows))
+        self._mass[pairs.diagonal] = problem.weights[problem.free]
+        starts = np.searchsorted(pairs.columns, np.arange(n + 1))
         if n:
-            self.linear = SuperLU(sp.csc_array((self._mass, found % n, starts)))
+            self.linear = SuperLU(sp.csc_array((self._mass, pairs.rows, starts)))
 
     def factorise(self, weights: FloatArray) -> None:
         """Take M + G^T W G with these weights (rows,)."""
@@ -70,12 +57,12 @@ class Rows:
     def pull(self, w: FloatArray, v: FloatArray, z: FloatArray, start: FloatArray) -> FloatArray:
         """(n, 3) G^T W (2 z - v - start)."""
         pull = np.zeros((self._vertices, 3))
-        add_pull(self.vertices, self.coefficients, w, v, z, start, pull)
+        add_pull(self.G, w, v, z, start, pull)
         return pull
 
 
 @compiled
-def project_on_balls(v, bounds, z):  # type: ignore[no-untyped-def]
+def project_on_balls(v: FloatArray, bounds: FloatArray, z: FloatArray) -> None:
     """z_i = min(1, b_i / |v_i|) v_i."""
     for i in range(len(v)):
         square = v[i, 0] ** 2 + v[i, 1] ** 2 + v[i, 2] ** 2
@@ -85,7 +72,7 @@ def project_on_balls(v, bounds, z):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def clamp_singular_values(v, bounds, z):  # type: ignore[no-untyped-def]
+def clamp_singular_values(v: FloatArray, bounds: FloatArray, z: FloatArray) -> None:
     """Each two rows times a function of their Gram matrix C, s -> min(1, b / s) of s^2.
 
     With eigenvalues s_1^2 >= s_2^2 and f_k = min(1, b / s_k), f(C) is
@@ -105,14 +92,15 @@ def clamp_singular_values(v, bounds, z):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def add_pull(vertices, coefficients, w, v, z, start, pull):  # type: ignore[no-untyped-def]
+def add_pull(
+    G: Rows, w: FloatArray, v: FloatArray, z: FloatArray, start: FloatArray, pull: FloatArray
+) -> None:
     """pull += G^T W (2 z - v - start)."""
-    for i in range(len(vertices)):
-        r0 = w[i] * (2 * z[i, 0] - v[i, 0] - start[i, 0])
-        r1 = w[i] * (2 * z[i, 1] - v[i, 1] - start[i, 1])
-        r2 = w[i] * (2 * z[i, 2] - v[i, 2] - start[i, 2])
-        for j in range(vertices.shape[1]):
-            k, g = vertices[i, j], coefficients[i, j]
-            pull[k, 0] += g * r0
-            pull[k, 1] += g * r1
-            pull[k, 2] += g * r2
+    m = len(G.axes)
+    for i in range(len(G.vertices)):
+        for a in range(m):
+            r = i * m + a
+            r0 = w[r] * (2 * z[r, 0] - v[r, 0] - start[r, 0])
+            r1 = w[r] * (2 * z[r, 1] - v[r, 1] - start[r, 1])
+            r2 = w[r] * (2 * z[r, 2] - v[r, 2] - start[r, 2])
+            add_row(G, G.coefficients, i, a, (r0, r1, r2), pull)
