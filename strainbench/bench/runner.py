@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 from strainbench.bench.cell import Cell
@@ -35,7 +36,8 @@ from strainbench.bench.judge import (
     unjudged,
 )
 from strainbench.bench.machine import describe_machine, fixed_threads
-from strainbench.bench.process import Child, Family, family
+from strainbench.bench.preload import Nurseries
+from strainbench.bench.process import Child, Family, family, spawned
 from strainbench.bench.recording import recorder
 from strainbench.bench.records import latest_runs, mend, open_folder, remember_machine, write_cell
 from strainbench.files import locked, uninterrupted
@@ -55,12 +57,15 @@ class Settings:
     jobs : cells at a time
     memory_limit_mb : resident size at which a cell's process is stopped
     rerun : run finished cells again
+    start : "fork" from a process that has loaded the suite and the cell's solver, where the system
+        can, or "spawn" a Python of its own
     """
 
     folder: Path
     jobs: int = 1
     memory_limit_mb: float = 8192.0
     rerun: bool = False
+    start: str = "fork"
 
 
 class Observer:
@@ -157,6 +162,7 @@ class Runner:
         self.observer.planned(wanted, len(cells) - len(wanted))
         shutil.rmtree(self.scratch, ignore_errors=True)
         with fixed_threads(1), family() as ours:  # the referee's
+            self._nurseries = Nurseries(ours, self.scratch, self.settings.start)
             court = Court(self, ours)
             with court.in_session():
                 missing = self._missing_recordings(wanted)
@@ -202,7 +208,8 @@ class Runner:
         recording = self._recording(cell) if cell.mode == "replay" else None
         folder = self.scratch / f"{cell.key}-{cell.mode}"
         with fixed_threads(cell.threads):
-            return Running.start(ours, cell, folder, recording, self.settings.memory_limit_mb)
+            limit, starter = self.settings.memory_limit_mb, self._nurseries.starter(cell)
+            return Running.start(ours, cell, folder, recording, limit, starter=starter)
 
     def _cannot_start(self, cell: Cell) -> bool:
         """Whether a cell ends before it begins, as a row with the reason."""
@@ -316,7 +323,9 @@ class Court:
         if self._referee is None or self._referee.exit_code is not None:
             folder = self._runner.scratch / f"referee-{len(self._family.children)}"
             folder.mkdir(parents=True)
-            self._referee = self._family.start(serve, (), folder, subprocess.PIPE)
+            self._referee = self._family.start(
+                serve, (), folder, partial(spawned, stdin=subprocess.PIPE)
+            )
         try:
             (item.folder / CASE).write_bytes(pickle.dumps((item.cell, item.ending)))
             stdin = self._referee.process.stdin
