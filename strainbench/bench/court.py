@@ -13,13 +13,14 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running, crashed
 from strainbench.bench.judge import JUDGED, judge, judge_limit, unjudged
-from strainbench.bench.process import Child, Family
+from strainbench.bench.process import Child, Family, spawned
 from strainbench.bench.rows import Verdict
 from strainbench.files import uninterrupted
 from strainbench.plugins import told
@@ -138,7 +139,9 @@ class Court:
         if self._referee is None or self._referee.exit_code is not None:
             folder = self._scratch / f"referee-{len(self._family.children)}"
             folder.mkdir(parents=True)
-            self._referee = self._family.start(serve, (), folder, subprocess.PIPE)
+            self._referee = self._family.start(
+                serve, (), folder, partial(spawned, stdin=subprocess.PIPE)
+            )
         try:
             (item.folder / CASE).write_bytes(pickle.dumps((item.cell, item.ending)))
             stdin = self._referee.process.stdin

@@ -15,7 +15,7 @@ from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import EVENTS, GO, read_journal
 from strainbench.bench.play import Task, play_cell
-from strainbench.bench.process import Child, Family
+from strainbench.bench.process import Child, Family, Starter, spawned
 
 START_LIMIT = 180.0  # [s] to import the suite and plug-ins and to build the problem, cold disks
 WARM_UP_LIMIT = 20.0  # [s] at least, compilation apart; the time limit where that is longer
@@ -61,10 +61,11 @@ class Running:
         recording: Path | None,
         memory_limit_mb: float,
         task: Task = play_cell,
+        starter: Starter = spawned,
     ) -> Running:
         """Start `task` in a new process."""
         folder.mkdir(parents=True)
-        child = family.start(task, (cell, folder, recording), folder)
+        child = family.start(task, (cell, folder, recording), folder, starter)
         return cls(cell, folder, child, memory_limit_mb)
 
     def has_ended(self) -> bool:
@@ -188,14 +189,16 @@ def crashed(code: int) -> str:
     return f"{Ending.CRASHED}: its process ended with exit code {code}{word}"
 
 
-def _resident_mb(pid: int) -> float:
+def _resident_mb(pid: int | None) -> float:
+    if pid is None:  # not begun
+        return 0.0
     try:
         return float(psutil.Process(pid).memory_info().rss / 1024**2)
     except psutil.Error:
         return 0.0
 
 
-def _family_mb(pid: int) -> float:
+def _family_mb(pid: int | None) -> float:
     """With what a process has started, counting what that shares with it once."""
     total = _resident_mb(pid)
     with suppress(psutil.Error):

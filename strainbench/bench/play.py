@@ -23,6 +23,7 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import GO, Journal, read_events, read_targets
+from strainbench.bench.nursery import untouched_mb
 from strainbench.physics.integrators import Project
 from strainbench.plugins import told
 from strainbench.scenario.scenario import StepReport
@@ -54,7 +55,7 @@ def with_journal(folder: Path, work: Callable[[Journal], None]) -> None:
         journal.write("failed", reason=reason)
         with suppress(Exception):  # a solver may have closed what prints
             traceback.print_exc()
-    journal.write("ended", peak_memory_mb=_peak_memory_mb())
+    journal.write("ended", peak_memory_mb=_peak_memory_mb() + untouched_mb())
 
 
 def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) -> None:

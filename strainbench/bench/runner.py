@@ -22,6 +22,7 @@ from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running
 from strainbench.bench.journal import keep_targets
 from strainbench.bench.machine import describe_machine, fixed_threads
+from strainbench.bench.preload import Nurseries
 from strainbench.bench.process import Family, family
 from strainbench.bench.recording import recorder
 from strainbench.bench.records import latest_runs, mend, open_folder, remember_machine, write_cell
@@ -41,12 +42,15 @@ class Settings:
     jobs : cells at a time
     memory_limit_mb : resident size at which a cell's process is stopped
     rerun : run finished cells again
+    processes : "fork" from a process that has loaded the suite and the cell's solver, where the system
+        can, or "spawn" a Python of its own
     """
 
     folder: Path
     jobs: int = 1
     memory_limit_mb: float = 8192.0
     rerun: bool = False
+    processes: str = "fork"
 
 
 @dataclass
@@ -124,6 +128,7 @@ class Runner:
         self.observer.planned(wanted, len(cells) - len(wanted))
         shutil.rmtree(self.scratch, ignore_errors=True)
         with fixed_threads(1), family() as ours:  # the referee's
+            self._nurseries = Nurseries(ours, self.scratch, self.settings.processes)
             court = Court(ours, self.scratch, self._settle)
             with court.in_session():
                 missing = self._missing_recordings(wanted)
@@ -169,7 +174,8 @@ class Runner:
         recording = self._recording(cell) if cell.mode == "replay" else None
         folder = self.scratch / f"{cell.key}-{cell.mode}"
         with fixed_threads(cell.threads):
-            return Running.start(ours, cell, folder, recording, self.settings.memory_limit_mb)
+            limit, starter = self.settings.memory_limit_mb, self._nurseries.starter(cell)
+            return Running.start(ours, cell, folder, recording, limit, starter=starter)
 
     def _cannot_start(self, cell: Cell) -> bool:
         """Whether a cell ends before it begins, as a row with the reason."""

@@ -126,6 +126,13 @@ Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", help="address of a dask scheduler whose workers run the cells"),
 ]
+Processes = Annotated[
+    str,
+    typer.Option(
+        "--processes",
+        help="fork (cells, where the system can, from one that has loaded what they need) or spawn",
+    ),
+]
 Rerun = Annotated[bool, typer.Option("--rerun", help="run finished cells again")]
 
 # where it goes, and how it looks

@@ -18,6 +18,7 @@ from strainbench.cli.options import (
     ManyValues,
     Memory,
     Mode,
+    Processes,
     Rerun,
     Scenarios,
     Scheduler,
@@ -49,14 +50,18 @@ def run_cells(
     jobs: Jobs = 1,
     threads: Threads = 1,
     scheduler: Scheduler = None,
+    processes: Processes = "fork",
     results: Folder = LOCAL / "run",
     rerun: Rerun = False,
 ) -> None:
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
     from strainbench.bench.machine import memory_share
     from strainbench.bench.plan import never_warm, plan
+    from strainbench.bench.preload import STARTS
     from strainbench.bench.runner import Settings
 
+    if processes not in STARTS:
+        raise ValueError(f"--processes {shown(processes)}: valid are {', '.join(STARTS)}")
     if scheduler is not None and not scheduler.strip():
         raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
     if steps is not None and duration is not None:
@@ -77,7 +82,8 @@ def run_cells(
     if "cold" not in starts and (cold := never_warm(solvers)):
         say(f"left out, as they cannot start warm: {', '.join(cold)}")
     jobs = min(jobs, len(cells))
-    _run(cells, Settings(results, jobs, memory_limit or memory_share(jobs), rerun), scheduler)
+    memory = memory_limit or memory_share(jobs)
+    _run(cells, Settings(results, jobs, memory, rerun, processes), scheduler)
 
 
 def _run(cells: Sequence[Cell], settings: Settings, scheduler: str | None) -> None:

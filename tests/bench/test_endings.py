@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
-from strainbench.bench.process import family
+from strainbench.bench.process import family, spawned
 from strainbench.bench.records import RUNS, STEPS, read_rows
 from strainbench.files import HOLDER
 from tests.processes import left_running, mark_what_starts
@@ -94,7 +94,7 @@ def test_a_run_ended_at_a_random_moment(tmp_path, monkeypatch, pytestconfig, sen
 def test_what_a_process_starts_ends_with_the_family(tmp_path, monkeypatch):
     token = mark_what_starts(monkeypatch)
     with family() as ours:
-        child = ours.start(_start_and_stay, (tmp_path / "started",), tmp_path)
+        child = ours.start(_start_and_stay, (tmp_path / "started",), tmp_path, spawned)
         patience = time.monotonic() + 60
         while not (tmp_path / "started").exists() and time.monotonic() < patience:
             time.sleep(0.01)
