@@ -42,7 +42,7 @@ class Settings:
     jobs : cells at a time
     memory_limit_mb : resident size at which a cell's process is stopped
     rerun : run finished cells again
-    processes : "fork" from a process that has loaded the suite and the cell's solver, where the system
+    processes : "fork" from one that has loaded the suite and the cell's solver, where the system
         can, or "spawn" a Python of its own
     """
 

@@ -27,8 +27,8 @@ from strainbench.problem.reach import gauge
 class Kind(ABC):
     """What limits demand of an element: lower <= measure(rows) <= bounds.
 
-    A kind has `needs`, `formula`, `measure`, `tightened`, and for the referee either `dual_norms`,
-    where its measure is a norm, or `convex = False` and `derivatives`. The rest has defaults.
+    A kind has `needs`, `formula`, `measure` and `tightened`, and for the referee `dual_norms` where
+    its measure is a norm, `convex = False` and `derivatives` where it is none.
 
     Parameters
     ----------

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
+from strainbench.problem.kinds import Exact
 from strainbench.problem.problem import Problem
 
 
@@ -38,7 +39,7 @@ class Rows(NamedTuple):
     @classmethod
     def of_axes(cls, problem: Problem) -> Rows:
         """Of each element those of its material axes: F^T, or (F D)^T with exact limits."""
-        if problem.limits.spectral:
+        if isinstance(problem.kind, Exact):
             return cls.of(problem)
         return cls._with(problem.elements, problem.gradients.swapaxes(1, 2))
 
