@@ -8,7 +8,7 @@ from scipy.spatial import Delaunay
 from strainbench import Problem, StretchLimits
 from strainbench.physics.linear import symmetric
 from strainbench.problem.grid import square_grid
-from strainbench.referee.reference import verify
+from strainbench.referee.reference import Reference
 
 
 def rotation(rng, dim=3):
@@ -224,7 +224,7 @@ def stretched_cube(limits):
 def own_gap(problem, solution):
     """The referee's relative gap, from the solver's own multipliers instead of a reference's."""
     nowhere = np.full_like(problem.target, np.nan)
-    bound = verify(problem, nowhere, solution.multipliers).lower_bound
+    bound = Reference.verified(problem, nowhere, solution.multipliers).lower_bound
     norms = problem.dual_norms(solution.multipliers)
     priced = float(norms @ problem.violations(solution.positions))
     return (problem.objective(solution.positions) + priced) / bound - 1

@@ -72,40 +72,46 @@ class Reference:
     failure: str | None = None
     cheaper: Dual | None = None
 
+    @classmethod
+    def local(cls, problem: Problem, positions: FloatArray) -> Reference:
+        """Of a problem that is not convex: nothing is known of other points."""
+        stretches = problem.stretches(positions)
+        active = stretches > problem.bounds - ACTIVE
+        if problem.kind.lower is not None:
+            active |= stretches < problem.lower_bounds + ACTIVE
+        nothing = np.full(problem.constraints, np.nan)
+        pins, nan = problem.infeasible_pins(), float("nan")
+        return cls(positions, nothing, nan, nan, int(np.sum(active)), pins)
+
+    @classmethod
+    def verified(
+        cls, problem: Problem, positions: FloatArray, multipliers: FloatArray
+    ) -> Reference:
+        """Bounds that hold whatever the positions (n, 3) and multipliers (rows, 3) are."""
+        if not problem.convex:
+            return cls.local(problem, positions)
+        lower_bound, norms = dual_bound(problem, multipliers)
+        infeasible = problem.infeasible_pins()
+        if infeasible is None and lower_bound > problem.largest_objective:
+            infeasible = (
+                "infeasible: the dual bound exceeds the objective of any point within limits"
+            )
+        feasible = bool(np.all(np.isfinite(positions))) and not np.any(
+            problem.violations(positions)
+        )
+        if not feasible:
+            nothing = np.full_like(problem.target, np.nan)
+            return cls(nothing, norms, lower_bound, np.inf, 0, infeasible)
+        gap = max(0.0, problem.objective(positions) - lower_bound)
+        error = np.sqrt(2 * gap / problem.least_weight)
+        active = int(np.sum(problem.stretches(positions) > problem.bounds - ACTIVE))
+        return cls(positions, norms, lower_bound, float(error), active, infeasible)
+
     @property
     def duals(self) -> list[Dual]:
         """What is known from multipliers, the highest lower bound first."""
         best = self.lower_bound, self.multiplier_norms
         return [best] if self.cheaper is None else [best, self.cheaper]
-
-
-def local(problem: Problem, positions: FloatArray) -> Reference:
-    """Of a problem that is not convex: nothing is known of other points."""
-    stretches = problem.stretches(positions)
-    active = stretches > problem.bounds - ACTIVE
-    if problem.kind.lower is not None:
-        active |= stretches < problem.lower_bounds + ACTIVE
-    nothing = np.full(problem.constraints, np.nan)
-    pins, nan = problem.infeasible_pins(), float("nan")
-    return Reference(positions, nothing, nan, nan, int(np.sum(active)), pins)
-
-
-def verify(problem: Problem, positions: FloatArray, multipliers: FloatArray) -> Reference:
-    """Bounds that hold whatever the positions (n, 3) and multipliers (rows, 3) are."""
-    if not problem.convex:
-        return local(problem, positions)
-    lower_bound, norms = dual_bound(problem, multipliers)
-    infeasible = problem.infeasible_pins()
-    if infeasible is None and lower_bound > problem.largest_objective:
-        infeasible = "infeasible: the dual bound exceeds the objective of any point within limits"
-    feasible = bool(np.all(np.isfinite(positions))) and not np.any(problem.violations(positions))
-    if not feasible:
-        nothing = np.full_like(problem.target, np.nan)
-        return Reference(nothing, norms, lower_bound, np.inf, 0, infeasible)
-    gap = max(0.0, problem.objective(positions) - lower_bound)
-    error = np.sqrt(2 * gap / problem.least_weight)
-    active = int(np.sum(problem.stretches(positions) > problem.bounds - ACTIVE))
-    return Reference(positions, norms, lower_bound, float(error), active, infeasible)
 
 
 class ReferenceSolver:
@@ -128,12 +134,12 @@ class ReferenceSolver:
         """The reference of a frame of this mesh; one that says so where the solvers failed."""
         with np.errstate(all="ignore"):  # what overflows is not finite, and judged as that
             if not np.any(problem.violations(problem.target)):
-                return verify(problem, problem.target, np.zeros((problem.rows, 3)))
+                return Reference.verified(problem, problem.target, np.zeros((problem.rows, 3)))
             key = content_key(problem)
             if key not in self._kept:
                 self._kept[key] = self._solve(problem)
             positions, (best, cheaper), failure = self._kept[key]
-            reference = replace(verify(problem, positions, best), failure=failure)
+            reference = replace(Reference.verified(problem, positions, best), failure=failure)
             if cheaper is best or not problem.convex:
                 return reference
             return replace(reference, cheaper=dual_bound(problem, cheaper))
@@ -218,7 +224,7 @@ def _enough(problem: Problem, positions: FloatArray, multipliers: FloatArray) ->
     """Whether a reference of these is an optimum, or shows that there is none."""
     if not problem.convex:
         return bool(np.all(np.isfinite(positions)))
-    reference = verify(problem, positions, multipliers)
+    reference = Reference.verified(problem, positions, multipliers)
     if not np.isfinite(reference.error):
         return reference.infeasible is not None
     gap = problem.objective(positions) - reference.lower_bound

@@ -11,7 +11,7 @@ import pytest
 from strainbench import Problem, StretchLimits, certify, solve
 from strainbench.problem.grid import square_grid
 from strainbench.referee.certificate import OUTCOMES
-from strainbench.referee.reference import ReferenceSolver, content_key, reference_of, verify
+from strainbench.referee.reference import Reference, ReferenceSolver, content_key, reference_of
 from tests.problems import (
     moved,
     random_placed_problem,
@@ -94,7 +94,7 @@ def test_a_poor_reference_is_rigorous_too(seed):
     problem, good, points = solved(seed)
     rng = np.random.default_rng(seed)
     multipliers = rng.normal(size=(problem.rows, 3)) * good.multiplier_norms[:, None]
-    poor = verify(problem, points[int(rng.integers(len(points)))], multipliers)
+    poor = Reference.verified(problem, points[int(rng.integers(len(points)))], multipliers)
     assert np.linalg.norm(poor.positions - good.positions) <= poor.error + good.error
     for x in [*points, problem.target, *(perturbed(rng, problem, p) for p in points)]:
         certificate = certify(problem, x, reference=poor)
@@ -110,7 +110,7 @@ def test_any_multipliers_give_a_lower_bound(seed):
     for scale in 10.0 ** np.arange(-9, 7, 3):
         noise = scale * rng.normal(size=along.shape)
         for Y in (noise, scale * np.maximum(0, rng.normal(size=(problem.rows, 1))) * along):
-            bound = verify(problem, ref.positions, Y)
+            bound = Reference.verified(problem, ref.positions, Y)
             assert bound.lower_bound <= problem.objective(ref.positions) * (1 + ROUNDING)
             assert bound.error >= 0
             assert bound.infeasible is None, "a feasible problem"
@@ -120,20 +120,20 @@ def test_any_multipliers_give_a_lower_bound(seed):
 def test_multipliers_that_are_no_numbers_count_as_zero(value):
     problem, ref, _ = solved(0)
     Y = np.full((problem.rows, 3), value)
-    assert verify(problem, ref.positions, Y).lower_bound == 0
+    assert Reference.verified(problem, ref.positions, Y).lower_bound == 0
 
 
 def test_a_reference_that_is_not_feasible_is_not_used():
     problem, ref, _ = solved(0)
     Y = np.zeros((problem.rows, 3))
     for x in (problem.target, np.full_like(problem.target, np.nan), 2 * ref.positions):
-        assert verify(problem, x, Y).error == np.inf
-        assert np.isnan(verify(problem, x, Y).positions).all()
+        assert Reference.verified(problem, x, Y).error == np.inf
+        assert np.isnan(Reference.verified(problem, x, Y).positions).all()
 
 
 def test_without_a_reference_the_outcome_says_so():
     problem, ref, _ = solved(0)
-    nothing = verify(problem, problem.target, np.zeros((problem.rows, 3)))
+    nothing = Reference.verified(problem, problem.target, np.zeros((problem.rows, 3)))
     certificate = certify(problem, ref.positions, reference=nothing)
     assert certificate.outcome == "feasible"
     assert "reference" in certificate.reason
@@ -407,8 +407,8 @@ def test_the_bounds_of_given_multipliers_turn_with_the_cloth(seed):
     rng = np.random.default_rng(seed)
     Q, shift = rotation(rng), problem.edge_length * rng.normal(size=3)
     Y = ref.multiplier_norms[:, None] * (problem.G @ points[-1])
-    before = verify(problem, points[1], Y)
-    after = verify(moved(problem, Q, shift), points[1] @ Q.T + shift, Y @ Q.T)
+    before = Reference.verified(problem, points[1], Y)
+    after = Reference.verified(moved(problem, Q, shift), points[1] @ Q.T + shift, Y @ Q.T)
     assert before.lower_bound > 0
     assert after.lower_bound == pytest.approx(before.lower_bound, rel=1e-9)
     np.testing.assert_allclose(after.multiplier_norms, before.multiplier_norms, rtol=1e-9)

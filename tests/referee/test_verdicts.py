@@ -7,7 +7,7 @@ import pytest
 
 from strainbench import Problem, StretchLimits, certify, solve
 from strainbench.referee.certificate import OUTCOMES
-from strainbench.referee.reference import Reference, ReferenceSolver, reference_of, verify
+from strainbench.referee.reference import Reference, ReferenceSolver, reference_of
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, run_solver
 from tests.hard_problems import hard_problem
@@ -273,7 +273,9 @@ def test_multipliers_of_any_size_give_a_bound():
     best = reference_of(problem).lower_bound
     Y = np.random.default_rng(0).normal(size=(problem.rows, 3))
     nowhere = np.full_like(problem.target, np.nan)
-    bounds = [verify(problem, nowhere, size * Y).lower_bound for size in (1, 1e-200, 1e200)]
+    bounds = [
+        Reference.verified(problem, nowhere, size * Y).lower_bound for size in (1, 1e-200, 1e200)
+    ]
     assert np.allclose(bounds, bounds[0], rtol=1e-9)
     assert bounds[0] <= best
-    assert isinstance(verify(problem, nowhere, np.full_like(Y, np.inf)), Reference)
+    assert isinstance(Reference.verified(problem, nowhere, np.full_like(Y, np.inf)), Reference)

@@ -8,7 +8,7 @@ import pytest
 from solvers.newton_ipm import Iterate, NewtonIPM, State
 from strainbench import Problem, StretchLimits, certify, solve
 from strainbench.problem.grid import square_grid
-from strainbench.referee.reference import verify
+from strainbench.referee.reference import Reference
 from strainbench.solver.solver import run_solver
 from tests.problems import (
     central_difference,
@@ -75,7 +75,7 @@ def assert_certified(problem, solution):
     assert solution.status == "solved"
     violations = problem.violations(solution.positions)
     assert violations.max() <= TOLERANCE
-    found = verify(problem, np.full_like(problem.target, np.nan), solution.multipliers)
+    found = Reference.verified(problem, np.full_like(problem.target, np.nan), solution.multipliers)
     priced = problem.objective(solution.positions) + found.multiplier_norms @ violations
     scale = max(found.lower_bound, problem.objective_floor)
     assert -1e-9 * scale <= priced - found.lower_bound <= TOLERANCE * scale
@@ -85,7 +85,7 @@ def assert_within_without_interior(problem, solution):
     """Close, by its own multipliers; the referee's price its violations higher."""
     assert solution.status == "stalled: limits without an interior"
     assert problem.violations(solution.positions).max() <= TOLERANCE
-    found = verify(problem, np.full_like(problem.target, np.nan), solution.multipliers)
+    found = Reference.verified(problem, np.full_like(problem.target, np.nan), solution.multipliers)
     assert problem.objective(solution.positions) == pytest.approx(found.lower_bound, rel=1e-2)
 
 
@@ -93,7 +93,9 @@ def assert_infeasible(problem, solution):
     assert solution.status == "infeasible"
     assert np.all(np.isnan(solution.positions))
     if problem.infeasible_pins() is None:
-        found = verify(problem, np.full_like(problem.target, np.nan), solution.multipliers)
+        found = Reference.verified(
+            problem, np.full_like(problem.target, np.nan), solution.multipliers
+        )
         assert found.lower_bound > problem.largest_objective
 
 
