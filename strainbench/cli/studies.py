@@ -139,9 +139,8 @@ def let_duel(
     solvers = [cell.solver.solver() for cell in cells]
     machine, about = describe_machine(threads=1)
     recording = _recorded(cells[0], max(map(max, sequences)), None if units else results)
-    turns = repeats * sum(map(len, sequences)) * len(cells)
     with progress() as bar:
-        task = bar.add_task("projections", total=turns)
+        task = bar.add_task("projections", total=repeats * sum(map(len, sequences)) * len(cells))
         entries = duel(
             solvers,
             recording,
