@@ -15,6 +15,7 @@ from typing import Annotated, TextIO
 
 import psutil
 import typer
+from rich import box
 from rich.console import Console
 
 from strainbench import __version__
@@ -37,6 +38,7 @@ from strainbench.cli.options import (
     Tolerance,
     Values,
 )
+from strainbench.document import terminal as on_terminal
 from strainbench.escape import plain, terminal
 from strainbench.files import disk_errors
 from strainbench.options import WrongWordError, number, path, shown, whole
@@ -102,7 +104,7 @@ def list_(
 ) -> None:
     """List solvers and scenarios: method, paper, availability; or the fields of one."""
     for table in tables(what):
-        console.print(table)
+        console.print(on_terminal(table, box.SIMPLE_HEAD))
 
 
 @app.command()
@@ -241,14 +243,15 @@ def compare(
 ) -> None:
     """Compare two folders of results, cell by cell: ratios of times, changes in outcome."""
     from strainbench.report import compare as comparing  # pandas only where needed
+    from strainbench.report.output import write_output
 
     found = comparing.compare(first, second)
     if output is not None:
-        comparing.write_comparison(found, output)
+        write_output(output, found.document(), found.cells())
     for line in found.head():
         say(line)
     for table in found.tables():
-        console.print(table)
+        console.print(on_terminal(table))
     for line in [*found.foot(), *([f"wrote {output}"] if output else [])]:
         say(line)
 
@@ -477,8 +480,9 @@ def duel_(
     output: TableFile = None,
 ) -> None:
     """Let solvers take turns on the same projections: ratios of times in one run."""
+    from strainbench.report.output import check_ending, write_output
     from strainbench.studies.duel.measure import duel, parse_frames
-    from strainbench.studies.duel.report import Outcome, check_ending, write_outcome
+    from strainbench.studies.duel.report import Outcome
 
     sequences = parse_frames(frame)
     last = max(numbers[-1] for numbers in sequences)
@@ -513,9 +517,11 @@ def duel_(
         entry.label = cell.solver.label
     title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
     outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
-    Console(width=max(console.width, 200)).print(outcome.table())  # its columns are many
+    Console(width=max(console.width, 200)).print(
+        on_terminal(outcome.table())
+    )  # its columns are many
     if output is not None:
-        write_outcome(outcome, output)
+        write_output(output, outcome.document(), outcome.cells())
         say(f"wrote {output}")
 
 
