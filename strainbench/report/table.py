@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from strainbench.document import (
     markdown,
 )
 from strainbench.report import warm
+from strainbench.report.machine import machine_section
 from strainbench.report.names import digits_of
 from strainbench.report.numbers import distance_text, seconds_text
 
@@ -43,7 +44,6 @@ CERTIFIED = """,
 itself certified to within {error:.1g} mm or, for most cells, better: `<` is a bound on a distance
 that is smaller than what its own cell's reference is certified to"""
 OLDER = "Older than what is installed, and to be had anew with `strainbench run ... --rerun`:"
-REASONS = "What kept a cell from optimal, or from what its scene is about"
 LOCAL = """
 *Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
 What such an answer is worth stands below: whether it is a local optimum, by the residual of the
@@ -194,13 +194,16 @@ def scene(row: pd.Series) -> str:
     )
 
 
-def reasons(runs: pd.DataFrame) -> list[str]:
+def reasons(runs: pd.DataFrame) -> Document:
     """A line for each cell that is not optimal on every step, or not what its scene is about."""
-    return [
+    lines = [
         f"{scene(r)}, {r['mode']}, {r['solver']}: {r['outcome']}; {r['reason']}"
         for _, r in runs.iterrows()
         if r["reason"] and r["solver"] != UNCONSTRAINED
     ]
+    return Document(
+        "What kept a cell from optimal, or from what its scene is about", [Items(lines)]
+    )
 
 
 def older(runs: pd.DataFrame) -> list[str]:
@@ -213,9 +216,9 @@ def older(runs: pd.DataFrame) -> list[str]:
     return lines
 
 
-def details(runs: pd.DataFrame) -> list[str]:
+def details(runs: pd.DataFrame) -> Document:
     """A line for each cell whose solver tells more of its time, such as a modelling layer's."""
-    return [
+    lines = [
         f"{r['solver']}, {scene(r)}: "
         + ", ".join(
             f"{k.replace('_', ' ')} {v:.4f}" for k, v in json.loads(r["details_mean"]).items()
@@ -223,6 +226,7 @@ def details(runs: pd.DataFrame) -> list[str]:
         for _, r in runs.iterrows()
         if r["details_mean"]
     ]
+    return Document("Inside the solve, means", [Items(lines)])
 
 
 def ledger(runs: pd.DataFrame) -> pd.DataFrame:
@@ -240,6 +244,10 @@ def ledger_table(runs: pd.DataFrame) -> Table:
     return replace(Table.of(ledger(runs)), title="Model ledger", header=columns)
 
 
+SECTIONS: tuple[Callable[[pd.DataFrame], Part], ...] = (warm.table, reasons, details, ledger_table)
+"""What stands below the tables of times, in table1.md and on the page."""
+
+
 def as_document(
     runs: pd.DataFrame,
     machines: Mapping[str, Mapping[str, object]],
@@ -253,10 +261,7 @@ def as_document(
         Items(older(runs), Prose(OLDER)),
         Document("Charts", pictures),
         *(group.table() for group in groups(runs)),
-        warm.table(runs),
-        Document(REASONS, [Items(reasons(runs))]),
-        Document("Inside the solve, means", [Items(details(runs))]),
-        ledger_table(runs),
+        *(section(runs) for section in SECTIONS),
         machine_section(machines),
     ]
     return Document(title, parts)
@@ -265,22 +270,6 @@ def as_document(
 def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
     """The same as a file, without charts."""
     return markdown(as_document(runs, machines))
-
-
-def machine_section(machines: Mapping[str, Mapping[str, object]]) -> Document:
-    """Where something was measured, a line a machine."""
-    return Document("Machine", [machine_line(*about) for about in machines.items()])
-
-
-def machine_line(name: str, facts: Mapping[str, object]) -> str:
-    """A machine and its facts in one line."""
-    packages = facts.get("packages")
-    versions = packages.items() if isinstance(packages, Mapping) else ()
-    return (
-        f"{name}: {facts['memory_gb']} GB, {facts['system']}, Python {facts['python']}, "
-        f"{facts['threads_per_solver']} thread a solver; "
-        + ", ".join(f"{package} {version}" for package, version in versions)
-    )
 
 
 def as_latex(runs: pd.DataFrame) -> str:

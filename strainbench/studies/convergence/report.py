@@ -18,7 +18,8 @@ from strainbench.bench.ending import Ending
 from strainbench.bench.records import RecordsError, read_machines, read_rows
 from strainbench.document import Column, Document, Items, Part, Prose, Table, markdown
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
-from strainbench.report.table import machine_section, power
+from strainbench.report.machine import machine_section
+from strainbench.report.table import power
 from strainbench.studies.convergence.measure import CANDIDATE, COLUMNS, CONVERGENCE
 
 LEVELS = (1e-2, 1e-4, 1e-6)

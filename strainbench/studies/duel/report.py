@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from math import isnan
 
 from strainbench.document import Column, Document, Prose, Table
-from strainbench.report.table import machine_line, power
+from strainbench.report.machine import machine_line
+from strainbench.report.table import power
 from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER, Entry
 
 EXPLANATION = (
