@@ -14,8 +14,18 @@ from markdown_it import MarkdownIt
 from rich import box
 from rich.console import Console
 
-from strainbench import document, escape
-from strainbench.document import Code, Column, Document, Items, Picture, Prose, Strong, Table
+from strainbench import escape
+from strainbench.document import (
+    Code,
+    Column,
+    Document,
+    Items,
+    Picture,
+    Prose,
+    Strong,
+    Table,
+    writers,
+)
 from strainbench.document.page import page
 from tests.test_escape import TEXTS, Text, text
 
@@ -31,12 +41,12 @@ TABLE = Table("Times", COLUMNS, LINES, Prose("Of *one* run."), ["a note"], "run 
 
 def on_terminal(table, width=2000, **look):
     file = io.StringIO()
-    Console(file=file, width=width).print(document.terminal(table, **look))
+    Console(file=file, width=width).print(writers.terminal(table, **look))
     return file.getvalue()
 
 
 def test_a_table_in_markdown():
-    assert document.markdown(TABLE) == (
+    assert writers.markdown(TABLE) == (
         "# Times\n\n`run --it`\n\nOf *one* run.\n\n"
         "| method | time [s] | said | share |\n"
         "| --- | ---: | --- | --- |\n"
@@ -47,7 +57,7 @@ def test_a_table_in_markdown():
 
 
 def test_a_table_in_latex_has_no_column_that_stands_aside():
-    assert document.latex([TABLE]) == (
+    assert writers.latex([TABLE]) == (
         "% Times\n% run --it\n\\begin{tabular}{lrl}\n"
         "method & time [s] & share \\\\ \\hline\n"
         "newton & 1.23 & 50\\% \\\\\n"
@@ -58,7 +68,7 @@ def test_a_table_in_latex_has_no_column_that_stands_aside():
 
 def test_csv_has_every_digit():
     table = Table.of(pd.DataFrame({"a": [1 / 3, float("nan")], "b": [1, 2], "c": ["=x", None]}))
-    assert document.csv(table) == f"a,b,c\n{1 / 3},1,'=x\n,2,\n"
+    assert writers.csv(table) == f"a,b,c\n{1 / 3},1,'=x\n,2,\n"
 
 
 @pytest.mark.parametrize("look", [box.MARKDOWN, box.SIMPLE_HEAD])
@@ -83,7 +93,7 @@ def test_pictures(tmp_path):
     (tmp_path / "a.svg").write_text("<?xml?><svg>here</svg>")
     drawn = Document("Charts", [Picture(tmp_path / "a.svg", "a [chart]")])
     assert '<div class="wide"><svg>here</svg></div>' in page(drawn)
-    html = MarkdownIt("commonmark").render(document.markdown(drawn))
+    html = MarkdownIt("commonmark").render(writers.markdown(drawn))
     assert 'alt="a [chart]"' in html
     assert "a.svg" in html
 
@@ -91,14 +101,12 @@ def test_pictures(tmp_path):
 def test_what_is_empty_is_left_out_with_its_title():
     empty = [Table("none", ["a"], [], "about", ["note"]), Items([], "head"), Document("in", [""])]
     parts = [*empty, Document("deep", [Document("deeper", ["words"])])]
-    assert document.markdown(Document("All", parts)) == (
-        "# All\n\n## deep\n\n### deeper\n\nwords\n"
-    )
+    assert writers.markdown(Document("All", parts)) == ("# All\n\n## deep\n\n### deeper\n\nwords\n")
 
 
 def test_a_line_of_another_length_is_noticed():
     with pytest.raises(ValueError, match="zip"):
-        document.markdown(Table("", ["a", "b"], [["alone"]]))
+        writers.markdown(Table("", ["a", "b"], [["alone"]]))
 
 
 # --- hostile text, in each place that takes text
@@ -113,7 +121,7 @@ def everywhere(words):
 
 @pytest.mark.parametrize("words", TEXTS)
 def test_markdown_reads_as_the_text(words):
-    written = document.markdown(everywhere(words))
+    written = writers.markdown(everywhere(words))
     html = MarkdownIt("commonmark").enable(["table", "strikethrough"]).render(written)
     ours = {"h1", "h2", "p", "code", "table", "thead", "tbody", "tr", "th", "td", "strong", "ul"}
     assert set(re.findall(r"<(\w+)", html)) == ours | {"li"}
@@ -134,7 +142,7 @@ def test_a_page_takes_any_text(words):
 
 @pytest.mark.parametrize("words", TEXTS)
 def test_latex_has_no_character_that_means_something(words):
-    written = document.latex([everywhere(words).parts[0]])
+    written = writers.latex([everywhere(words).parts[0]])
     plain, latex = escape.plain(words), escape.latex(words)
     assert written.splitlines()[:2] == [f"% {plain}"] * 2
     assert f"{latex} & \\textbf{{{latex}}} \\\\" in written
@@ -142,7 +150,7 @@ def test_latex_has_no_character_that_means_something(words):
 
 @pytest.mark.parametrize("words", TEXTS)
 def test_csv_has_no_formula(words):
-    header, line = csv.reader(io.StringIO(document.csv(everywhere(words).parts[0])))
+    header, line = csv.reader(io.StringIO(writers.csv(everywhere(words).parts[0])))
     assert header[0] == line[0] == line[1] == escape.cell(words)
 
 

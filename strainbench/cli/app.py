@@ -38,7 +38,7 @@ from strainbench.cli.options import (
     Tolerance,
     Values,
 )
-from strainbench.document import terminal as on_terminal
+from strainbench.document.writers import terminal as on_terminal
 from strainbench.escape import plain, terminal
 from strainbench.files import disk_errors
 from strainbench.options import WrongWordError, number, path, shown, whole

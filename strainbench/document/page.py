@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, Template
 from markdown_it import MarkdownIt
 from markupsafe import Markup, escape
 
-from strainbench.document.model import Code, Document, Picture, Prose, Strong, blocks
+from strainbench.document import Code, Document, Picture, Prose, Strong, blocks
 from strainbench.escape import plain
 
 

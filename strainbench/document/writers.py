@@ -11,7 +11,7 @@ from rich.console import JustifyMethod
 from rich.table import Table as Grid
 
 from strainbench import escape
-from strainbench.document.model import (
+from strainbench.document import (
     Block,
     Code,
     Heading,

@@ -8,8 +8,9 @@ import pandas as pd
 
 from strainbench.bench.columns import WORDS
 from strainbench.bench.records import RecordsError, read_machines
-from strainbench.document import Document, Prose, Table, csv, markdown
+from strainbench.document import Document, Prose, Table
 from strainbench.document.page import page
+from strainbench.document.writers import csv, markdown
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_table
 from strainbench.report.failures import failures, failures_document

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from strainbench.bench.records import open_folder
-from strainbench.document import Document, Table, csv, markdown
+from strainbench.document import Document, Table
+from strainbench.document.writers import csv, markdown
 
 ENDINGS = (".csv", ".md")
 

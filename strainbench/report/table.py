@@ -11,18 +11,8 @@ import numpy as np
 import pandas as pd
 
 from strainbench.bench.ending import Ending
-from strainbench.document import (
-    Column,
-    Document,
-    Items,
-    Part,
-    Picture,
-    Prose,
-    Strong,
-    Table,
-    latex,
-    markdown,
-)
+from strainbench.document import Column, Document, Items, Part, Picture, Prose, Strong, Table
+from strainbench.document.writers import latex, markdown
 from strainbench.report import warm
 from strainbench.report.machine import machine_section
 from strainbench.report.names import digits_of

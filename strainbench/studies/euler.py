@@ -20,7 +20,8 @@ import typer
 from rich.console import Console
 
 from strainbench.arrays import FloatArray
-from strainbench.document import Column, Table, terminal
+from strainbench.document import Column, Table
+from strainbench.document.writers import terminal
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
 from strainbench.physics.integrators import Motion, Project, step_and_project

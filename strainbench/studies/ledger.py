@@ -25,7 +25,8 @@ from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.machine import describe_machine
 from strainbench.bench.records import open_folder, remember_machine
-from strainbench.document import Column, Document, Prose, Table, csv, markdown
+from strainbench.document import Column, Document, Prose, Table
+from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.contact import Contact, Floor

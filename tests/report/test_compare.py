@@ -9,7 +9,7 @@ import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS
 from strainbench.bench.records import RUNS, RecordsError, append_rows
-from strainbench.document import csv as as_csv
+from strainbench.document.writers import csv as as_csv
 from strainbench.report.compare import CSV_HEADER, compare
 from strainbench.report.output import write_output
 from tests.cli.test_cli import strainbench

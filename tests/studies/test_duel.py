@@ -11,7 +11,7 @@ import pytest
 from strainbench import Solution, Solver
 from strainbench.bench.plan import plan_one
 from strainbench.bench.recording import record, record_all, recorded, recorder
-from strainbench.document import markdown
+from strainbench.document.writers import markdown
 from strainbench.report.output import check_ending
 from strainbench.solver.registry import find_solver
 from strainbench.studies.duel.measure import Entry, duel, parse_frames

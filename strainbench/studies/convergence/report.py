@@ -16,7 +16,8 @@ from strainbench import escape
 from strainbench.bench.columns import WORDS
 from strainbench.bench.ending import Ending
 from strainbench.bench.records import RecordsError, read_machines, read_rows
-from strainbench.document import Column, Document, Items, Part, Prose, Table, markdown
+from strainbench.document import Column, Document, Items, Part, Prose, Table
+from strainbench.document.writers import markdown
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
 from strainbench.report.machine import machine_section
 from strainbench.report.table import power
