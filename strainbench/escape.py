@@ -17,7 +17,7 @@ FORMULA = re.compile(r"'*[=+\-@\t\r\uff1d\uff0b\uff0d\uff20]")
 MARKDOWN = (
     (re.compile(r"([\\`*|~])"), r"\\\1"),
     (re.compile(r"&"), "&amp;"),
-    (re.compile(r"<"), "&lt;"),
+    (re.compile(r"<(?=[A-Za-z/!?])"), "&lt;"),  # else it begins no tag
     (re.compile(r"(?<![^\W_])_|_(?![^\W_])"), r"\\_"),  # within a word it is no emphasis
     (re.compile(r"\](?=[(:\[])"), r"\\]"),  # a link's; other brackets are plain
     (re.compile(r"^([#>=\[]|[+-](?=\s|-))"), r"\\\1"),  # what would begin a heading, an item,

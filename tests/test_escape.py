@@ -23,6 +23,7 @@ from strainbench import escape
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.plan import plan
 from strainbench.bench.records import RUNS, STEPS, append_rows
+from strainbench.document import writers
 from strainbench.studies.duel.measure import Racer
 from strainbench.studies.duel.report import Outcome
 from strainbench.studies.ledger.measure import Row
@@ -257,10 +258,10 @@ def test_a_duel_shows_any_text_as_it_is(nasty):
     facts = {"memory_gb": 1, "system": nasty, "python": "3", "threads_per_solver": 1}
     outcome = Outcome(nasty, f"strainbench duel {nasty}", {nasty: facts}, [entry])
     file = io.StringIO()
-    Console(file=file, width=2000).print(outcome.table())
+    Console(file=file, width=2000).print(writers.terminal(outcome.table()))
     assert escape.plain(nasty) in file.getvalue()
-    assert table_cells(outcome.markdown())[0][0] == escape.plain(nasty)
-    (row,) = csv.DictReader(io.StringIO(outcome.csv()))
+    assert table_cells(writers.markdown(outcome.document()))[0][0] == escape.plain(nasty)
+    (row,) = csv.DictReader(io.StringIO(writers.csv(outcome.cells())))
     assert row["method"] == escape.cell(nasty)
 
 

@@ -69,6 +69,28 @@ def test_example_solver_is_short_and_honest(tmp_path):
     assert certify(problem, solve(problem, solver()).positions).outcome == "feasible"
 
 
+def test_example_table_is_short_and_stands_in_the_report(tmp_path, monkeypatch):
+    from strainbench.bench.columns import RUN_COLUMNS
+    from strainbench.bench.records import RUNS, append_rows
+    from strainbench.report import load_runs, table
+    from tests.report.test_report import row
+
+    source = blocks(CONTRIBUTING, "python")[1]
+    assert len(source.strip().splitlines()) <= 30
+    exec(compile(source, "CONTRIBUTING.md", "exec"), space := {})
+    cells = [row("a"), row("a", resolution=20, solve_seconds_mean=0.1), row("b")]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, cells)
+    monkeypatch.setattr(table, "SECTIONS", (space["spread"],))
+    written = table.as_markdown(load_runs(tmp_path), {})
+    assert "## Fastest and slowest cells\n" in written
+    for line in (
+        "| --- | --- | ---: | ---: |",
+        "| a | 2 | 0.02 | 0.1 |",
+        "| b | 1 | 0.02 | 0.02 |",
+    ):
+        assert line in written
+
+
 @pytest.mark.parametrize("target", re.findall(r"`make ([a-z-]+)`", README))
 def test_make_targets_exist(target):
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE)

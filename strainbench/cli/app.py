@@ -61,10 +61,13 @@ def show_list(
     ] = None,
 ) -> None:
     """List solvers and scenarios: method, paper, availability; or the fields of one."""
+    from rich import box
+
     from strainbench.cli.listing import tables
+    from strainbench.document.writers import terminal as on_terminal
 
     for table in tables(what):
-        console.print(table)
+        console.print(on_terminal(table, box.SIMPLE_HEAD))
 
 
 VERBS: dict[str, Callable[..., None]] = {

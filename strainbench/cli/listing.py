@@ -8,13 +8,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from rich import box
-from rich.table import Table
-
 from strainbench.bench.cell import PluginRef
 from strainbench.bench.plan import from_file, with_defaults
 from strainbench.bench.settings import is_file
-from strainbench.escape import terminal
+from strainbench.document import Column, Table
 from strainbench.fields import hints, spelled, words
 from strainbench.options import shown
 from strainbench.plugins import Listed, UnavailableError, nearest
@@ -92,21 +89,12 @@ def in_file(path: str) -> list[Solver | Scenario]:
 
 def overview(title: str, entries: Sequence[Listed]) -> Table:
     """Name, whether it can be used, and below each other method, paper, why it cannot."""
-    table = _table(title)
-    table.add_column("name", no_wrap=True)
-    table.add_column("available", no_wrap=True)
-    table.add_column("method, paper" if title == "solvers" else "scene, paper", overflow="fold")
+    lines = []
     for e in entries:
-        about = [
-            e.method,
-            *([e.paper] if e.paper else []),
-            *([e.unavailable] * bool(e.unavailable)),
-        ]
-        lines = terminal(about[0])
-        for line in about[1:]:
-            lines.append("\n").append_text(terminal(line))
-        table.add_row(terminal(e.name), "no" if e.unavailable else "yes", lines)
-    return table
+        lines.append([e.name, "no" if e.unavailable else "yes", e.method])
+        lines += [["", "", text] for text in (e.paper, e.unavailable) if text]
+    about = "method, paper" if title == "solvers" else "scene, paper"
+    return Table(title, [Column("name", whole=True), Column("available", whole=True), about], lines)
 
 
 def details(plugin: Solver | Scenario) -> Table:
@@ -115,26 +103,12 @@ def details(plugin: Solver | Scenario) -> Table:
     ref = PluginRef.of(plugin)
     name = ref.name if kind == "scenario" else ref.label
     head = (inspect.getdoc(plugin) or "").split("\n")[0]
-    settings = described(plugin)
-    table = _table(f"{kind} {name}: {head}" + ("" if settings else " It has no settings."))
-    table.expand = True
-    for column in ("--set", "default", "unit"):
-        table.add_column(column, overflow="fold", no_wrap=column == "--set")
-    table.add_column("what", overflow="fold", ratio=1)
-    for f in settings:
-        about = "; ".join(part for part in (f.kind, f.about) if part)
-        table.add_row(*map(terminal, (f.name, f.default, f.unit, about)))
-    return table
-
-
-def _table(title: str) -> Table:
-    return Table(
-        title=terminal(title),
-        title_justify="left",
-        title_style="bold",
-        box=box.SIMPLE_HEAD,
-        pad_edge=False,
-    )
+    lines = [
+        [f.name, f.default, f.unit, "; ".join(part for part in (f.kind, f.about) if part)]
+        for f in described(plugin)
+    ]
+    title = f"{kind} {name}: {head}" + ("" if lines else " It has no settings.")
+    return Table(title, [Column("--set", whole=True), "default", "unit", "what"], lines)
 
 
 def described(plugin: Solver | Scenario) -> list[FieldEntry]:

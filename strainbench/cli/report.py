@@ -29,14 +29,16 @@ def compare_results(
     output: TableFile = None,
 ) -> None:
     """Compare two folders of results, cell by cell: ratios of times, changes in outcome."""
-    from strainbench.report.compare import compare, write_comparison
+    from strainbench.document.writers import terminal
+    from strainbench.report.compare import compare
+    from strainbench.report.output import write_output
 
     found = compare(first, second)
     if output is not None:
-        write_comparison(found, output)
+        write_output(output, found.document(), found.cells())
     for line in found.head():
         say(line)
     for table in found.tables():
-        console.print(table)
+        console.print(terminal(table))
     for line in [*found.foot(), *([f"wrote {output}"] if output else [])]:
         say(line)

@@ -129,8 +129,10 @@ def let_duel(
     """Let solvers take turns on the same projections: ratios of times in one run."""
     from strainbench.bench.machine import describe_machine
     from strainbench.bench.plan import plan_available
+    from strainbench.document.writers import terminal
+    from strainbench.report.output import check_ending, write_output
     from strainbench.studies.duel.measure import duel, parse_frames
-    from strainbench.studies.duel.report import Outcome, check_ending, write_outcome
+    from strainbench.studies.duel.report import Outcome
 
     sequences = parse_frames(frame)
     if output is not None:
@@ -155,9 +157,10 @@ def let_duel(
         entry.label = cell.solver.label
     title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
     outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
-    Console(width=max(console.width, 200)).print(outcome.table())  # its columns are many
+    wide = Console(width=max(console.width, 200))  # its columns are many
+    wide.print(terminal(outcome.table()))
     if output is not None:
-        write_outcome(outcome, output)
+        write_output(output, outcome.document(), outcome.cells())
         say(f"wrote {output}")
 
 

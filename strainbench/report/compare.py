@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from rich import box
-from rich.table import Table
 
-from strainbench import escape
-from strainbench.bench.records import RecordsError, Row, open_folder
+from strainbench.bench.records import RecordsError, Row
+from strainbench.document import Column, Document, Items, Part, Table
 from strainbench.report.names import cells, digits
 from strainbench.report.pair import SAME, Pair
 from strainbench.report.versions import shown_runs
 
 MEASURES = ("outcome", "steps_done", "solve_seconds_mean", "max_violation", "relative_gap_max")
-HEADER = ("mesh", "limit", "method", "outcome", "A [s]", "B [s]", "B/A", "violation", "gap")
+HEADER = (
+    *("mesh", "limit", Column("method", whole=True), "outcome", Column("A", "s"), Column("B", "s")),
+    *("B/A", "violation", "gap"),
+)
 CSV_HEADER = (
     *SAME,
     *(f"{name}_{side}" for name in MEASURES for side in "ab"),
@@ -77,13 +76,15 @@ class Comparison:
     def _sides(self) -> Iterator[list[Row]]:
         yield from (list(rows) for rows in zip(*(p.both for p in self.matched), strict=True))
 
-    def groups(self) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
-        """Titles and lines of the tables."""
-        tables: dict[tuple[str, ...], list[Pair]] = {}
+    def tables(self) -> list[Table]:
+        """The cells in both, those that are alike in a table."""
+        alike: dict[tuple[str, ...], list[Pair]] = {}
         for pair in self.matched:
-            tables.setdefault(pair.alike, []).append(pair)
-        for pairs in tables.values():
-            yield pairs[0].group, [pair.cells() for pair in pairs]
+            alike.setdefault(pair.alike, []).append(pair)
+        return [
+            Table(pairs[0].group, HEADER, [pair.cells() for pair in pairs])
+            for pairs in alike.values()
+        ]
 
     def foot(self) -> list[str]:
         """Lines below the tables."""
@@ -97,43 +98,27 @@ class Comparison:
             f"{about}: {', '.join(solvers)}" for about, solvers in alone.items()
         ]
 
-    def tables(self) -> Iterator[Table]:
-        """For the terminal."""
-        for title, lines in self.groups():
-            table = Table(title=escape.terminal(title), title_justify="left", box=box.MARKDOWN)
-            for name in HEADER:
-                table.add_column(name, no_wrap=name == "method", overflow="fold")
-            for line in lines:
-                table.add_row(*map(escape.terminal, line))
-            yield table
-
-    def markdown(self) -> str:
+    def document(self) -> Document:
         """All of it."""
-        parts = ["# Two results folders, cell by cell", *map(escape.markdown, self.head())]
-        for title, lines in self.groups():
-            rows = [HEADER, ("---",) * len(HEADER), *(map(escape.markdown, line) for line in lines)]
-            parts += [
-                f"## {escape.markdown(title)}",
-                "\n".join(f"| {' | '.join(row)} |" for row in rows),
-            ]
-        if notes := self.foot():
-            parts.append("\n".join(f"- {escape.markdown(note)}" for note in notes))
-        return "\n\n".join(parts) + "\n"
+        parts: list[Part] = [*self.head(), *self.tables(), Items(self.foot())]
+        return Document("Two results folders, cell by cell", parts)
 
-    def csv(self) -> str:
+    def cells(self) -> Table:
         """One line a cell, those that one folder alone has too."""
-        buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, CSV_HEADER, lineterminator="\n")
-        writer.writeheader()
-        for pair in self.pairs:
-            line: dict[str, object] = {name: pair.row[name] for name in SAME}
-            for side, row in (("a", pair.a), ("b", pair.b)):
-                line |= {f"{name}_{side}": row[name] if row else "" for name in MEASURES}
-            line["seconds_ratio"] = pair.ratio if pair.ratio > 0 else ""
-            line["only_in"] = "" if pair.a and pair.b else "a" if pair.a else "b"
-            line["note"] = pair.note
-            writer.writerow({name: escape.cell(value) for name, value in line.items()})
-        return buffer.getvalue()
+        return Table("", CSV_HEADER, [_line(pair) for pair in self.pairs])
+
+
+def _line(pair: Pair) -> list[object]:
+    """The entries of CSV_HEADER."""
+    sides = (pair.a, pair.b)
+    alone = "" if pair.a and pair.b else "a" if pair.a else "b"
+    return [
+        *(pair.row[name] for name in SAME),
+        *(row[name] if row else "" for name in MEASURES for row in sides),
+        pair.ratio if pair.ratio > 0 else "",
+        alone,
+        pair.note,
+    ]
 
 
 def compare(first: Path, second: Path) -> Comparison:
@@ -154,12 +139,3 @@ def compare(first: Path, second: Path) -> Comparison:
     precision = digits(row["scenario_parameters"] for side in sides for row in side.values())
     pairs = [Pair(a.get(key), b.get(key), precision) for key in dict.fromkeys([*a, *b])]
     return Comparison((str(first), str(second)), pairs)
-
-
-def write_comparison(found: Comparison, path: Path) -> None:
-    """As CSV or Markdown, by what the name ends in; ValueError for another ending."""
-    forms = {".csv": found.csv, ".md": found.markdown}
-    if path.suffix not in forms:
-        raise ValueError(f"-o {path}: a name that ends in {', '.join(forms)} is valid")
-    open_folder(path.parent, "-o")
-    path.write_text(forms[path.suffix](), encoding="utf-8")

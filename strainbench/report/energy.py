@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from strainbench import escape
+from strainbench.document import Column, Prose, Table
 from strainbench.report.chart import COLOURS, save
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits, settings
 from strainbench.report.steps import newest_steps
@@ -27,13 +28,11 @@ PARTS = [
 IN_NAMES = {*SPANNED, MESH_FILE, CURVE_FILE, "step", "integrator"}
 """Settings that panels and curves are called by anyway."""
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
-TABLE = """# Total energy
-
+EXPLANATION = """\
 After each step. Energy above that of the first steps is a sign of instability; a run that comes to
-rest has a small range in its last quarter.
-
-| scene | run | steps | time [s] | first [mJ] | highest | last | range in the last quarter |
-| --- | --- | --- | --- | --- | --- | --- | --- |"""
+rest has a small range in its last quarter."""
+NUMBERS = {"time": "s", "first": "mJ", "highest": "", "last": "", "range in the last quarter": ""}
+"""Columns with their units."""
 LOW = 2.0  # times the loss of the runs that lose energy: how far below the start the axis goes
 ENDED = "ended after"  # in the names of runs without an answer to the end
 
@@ -99,18 +98,16 @@ def ended(row: pd.Series) -> str:
     return f", {ENDED} {row['steps_done']:.0f} of {row['steps_asked']:.0f} steps" if early else ""
 
 
-def energy_markdown(folder: Path, runs: pd.DataFrame) -> str:
-    """A table of each run's energies, or nothing without energies."""
+def energy_table(folder: Path, runs: pd.DataFrame) -> Table:
+    """A line a run; none without energies."""
     lines = []
     for _, run in energies(folder, runs).groupby("cell", sort=False):
-        energy = 1000 * run["energy"].to_numpy()
+        energy, first = 1000 * run["energy"].to_numpy(), run.iloc[0]
         late = energy[-max(2, len(energy) // 4) :]
         values = (energy[0], energy.max(), energy[-1], late.max() - late.min())
-        first, end = run.iloc[0], run["time"].max()
-        numbers = " | ".join(f"{v:.4g}" for v in (end, *values))
-        words = " | ".join(escape.markdown(first[k]) for k in ("panel", "curve"))
-        lines.append(f"| {words} | {len(run)} | {numbers} |")
-    return "\n".join([TABLE, *lines]) + "\n" if lines else ""
+        lines.append([first["panel"], first["curve"], len(run), run["time"].max(), *values])
+    numbers = [Column(name, unit, ".4g") for name, unit in NUMBERS.items()]
+    return Table("Total energy", ["scene", "run", "steps", *numbers], lines, Prose(EXPLANATION))
 
 
 def draw_energy(folder: Path, runs: pd.DataFrame) -> list[Path]:

@@ -14,12 +14,13 @@ from typing import Any
 
 import pandas as pd
 
-from strainbench import escape
 from strainbench.bench.ending import Ending
+from strainbench.document import Document, Items, Prose, Table
 from strainbench.referee.certificate import OUTCOMES
+from strainbench.report.machine import machine_section
 from strainbench.report.numbers import distance_text
 from strainbench.report.steps import newest_steps
-from strainbench.report.table import UNCONSTRAINED, machine_line, power
+from strainbench.report.table import UNCONSTRAINED, power
 from strainbench.scenario.registry import find_scenario
 
 EXPLANATION = """\
@@ -148,30 +149,25 @@ def _verdict(row: pd.Series, easier: pd.Series | None, apart: str) -> str:
     return f"{easier['outcome']} at {apart} too: by its nature, or a fault of ours"
 
 
-def failures_markdown(
+def failures_document(
     table: pd.DataFrame, runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]
-) -> str:
+) -> Document:
     """Methods against cases, what the signs mean, a line for each failure, the machine."""
     cases, methods = list(dict.fromkeys(table["case"])), list(dict.fromkeys(table["method"]))
     cells = {(r["case"], r["method"]): _cell(r) for _, r in table.iterrows()}
-    lines = [["method", *map(escape.markdown, cases)], ["---"] * (1 + len(cases))]
-    lines += [
-        [escape.markdown(m), *(escape.markdown(cells.get((c, m), "")) for c in cases)]
-        for m in methods
-    ]
+    lines = [[m, *(cells.get((c, m), "") for c in cases)] for m in methods]
     first = runs.iloc[0]
-    limits = {"violation": first["violation_threshold"], "gap": first["gap_threshold"]}
-    parts = ["# Where methods fail", EXPLANATION.format(**limits)]
-    parts.append("\n".join("| " + " | ".join(line) + " |" for line in lines))
-    for case, rows in table[table["sign"] != PASSED].groupby("case", sort=False):
-        reasons = [
-            f"{r['method']}: {r['found']}; {r['verdict']}. In full: {r['reason']}"
-            for _, r in rows.iterrows()
-        ]
-        listed = "\n".join(f"- {escape.markdown(reason)}" for reason in reasons)
-        parts.append(f"## {escape.markdown(case)}\n\n{listed}")
-    parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
-    return "\n\n".join(parts) + "\n"
+    about = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
+    failed = [
+        Document(str(case), [Items([_failure(r) for _, r in rows.iterrows()])])
+        for case, rows in table[table["sign"] != PASSED].groupby("case", sort=False)
+    ]
+    grid = Table("", ["method", *cases], lines, Prose(about))
+    return Document("Where methods fail", [grid, *failed, machine_section(machines)])
+
+
+def _failure(row: pd.Series) -> str:
+    return f"{row['method']}: {row['found']}; {row['verdict']}. In full: {row['reason']}"
 
 
 def _cell(row: pd.Series) -> str:

@@ -15,9 +15,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 
 from strainbench import escape
+from strainbench.document import Column, Table
 from strainbench.report.chart import CERTIFIED, FLOOR_MM, draw_certified, save, styles
 from strainbench.report.names import describe, digits, digits_of, settings
-from strainbench.report.table import UNCONSTRAINED, accuracy_text, time_text
+from strainbench.report.table import ACCURACY, UNCONSTRAINED, accuracy_text, time_text
 
 FEWEST = 3  # values of a setting that make a sweep
 APART = 1.6  # times the largest number: where a chart has the words among the values
@@ -73,32 +74,30 @@ def beyond_text(row: pd.Series | None) -> str:
     return "" if row is None or pd.isna(row["beyond"]) else f"{row['beyond']:.2g}"
 
 
-def sweep_markdown(runs: pd.DataFrame) -> list[str]:
+def sweep_tables(runs: pd.DataFrame) -> list[Table]:
     """A table for each sweep: rows are values, columns solvers."""
-    columns = ("violation · gap · mm", "beyond")
-    parts = []
-    for key, rows in sweeps(runs).items():
-        rows = rows.assign(beyond=beyond(rows))
-        precision = digits(rows["rest"])
-        for _, group in rows.groupby("line", sort=False):
-            first = group.iloc[0]
-            rest = describe(first["rest"], (), precision)
-            about = ", ".join(filter(None, (first["mode"], rest, *_how(first, rows))))
-            solvers = list(dict.fromkeys(group["solver"]))
-            header = [key, *(t for s in solvers for t in (f"{escape.markdown(s)} [s]", *columns))]
-            lines = [header, ["---"] * len(header)]
-            for _, at in group.groupby("value"):
-                by_solver = {r["solver"]: r for _, r in at.iterrows()}
-                texts = [
-                    text(by_solver.get(s))
-                    for s in solvers
-                    for text in (time_text, accuracy_text, beyond_text)
-                ]
-                lines.append([escape.markdown(at["shown"].iloc[0]), *texts])
-            table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
-            title = escape.markdown(f"{first['scenario']} against {key} ({about})")
-            parts.append(f"## {title}\n\n{table}")
-    return parts
+    return [
+        _table(key, group, rows)
+        for key, rows in sweeps(runs).items()
+        for _, group in rows.assign(beyond=beyond(rows)).groupby("line", sort=False)
+    ]
+
+
+def _table(key: str, group: pd.DataFrame, rows: pd.DataFrame) -> Table:
+    """That of one line among the rows of its sweep."""
+    first, solvers = group.iloc[0], list(dict.fromkeys(group["solver"]))
+    rest = describe(first["rest"], (), digits(rows["rest"]))
+    about = ", ".join(filter(None, (first["mode"], rest, *_how(first, rows))))
+    header: list[str | Column] = [key]
+    for solver in solvers:
+        header += [Column(solver, "s"), ACCURACY, "beyond"]
+    lines = []
+    for _, at in group.groupby("value"):
+        by_solver = {r["solver"]: r for _, r in at.iterrows()}
+        cells = [by_solver.get(solver) for solver in solvers]
+        texts = [text(c) for c in cells for text in (time_text, accuracy_text, beyond_text)]
+        lines.append([at["shown"].iloc[0], *texts])
+    return Table(f"{first['scenario']} against {key} ({about})", header, lines)
 
 
 def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:

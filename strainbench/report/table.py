@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import json
-import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from strainbench import escape
 from strainbench.bench.ending import Ending
+from strainbench.document import Column, Document, Items, Part, Picture, Prose, Strong, Table
+from strainbench.document.writers import latex, markdown
 from strainbench.report import warm
+from strainbench.report.machine import machine_section
 from strainbench.report.names import digits_of
 from strainbench.report.numbers import distance_text, seconds_text
 
 GROUP = ["scenario", "mode", "exact", "tolerance", "steps_asked", "threads"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
+TITLE = "Table 1: seconds a projection, and the accuracy reached"
+ACCURACY = "violation · gap · mm"
 EXPLANATION = """\
 Seconds are means over projections of the time inside the solver, set-up apart, measured by the
 suite. `*`: some steps did not converge (the referee finds a violation above {violation}) or the
@@ -30,7 +34,6 @@ CERTIFIED = """,
 itself certified to within {error:.1g} mm or, for most cells, better: `<` is a bound on a distance
 that is smaller than what its own cell's reference is certified to"""
 OLDER = "Older than what is installed, and to be had anew with `strainbench run ... --rerun`:"
-REASONS = "What kept a cell from optimal, or from what its scene is about"
 LOCAL = """
 *Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
 What such an answer is worth stands below: whether it is a local optimum, by the residual of the
@@ -73,6 +76,17 @@ class Group:
         )
         return [float(means.get(n, float("nan"))) for n in self.meshes] if len(means) else []
 
+    def table(self) -> Table:
+        """A line a limit and solver, a time and what it reached a mesh."""
+        header: list[str | Column] = ["limit", "method"]
+        for name in self.meshes:
+            header += [Column(name, "s", right=True), Column(ACCURACY, aside=True)]
+        means = [cell for mean in self.implicit_euler() for cell in (seconds_text(mean), "")]
+        lines = [["", "implicit Euler", *means]] if means else []
+        for limit, solver, rows in self.blocks():
+            lines.append([limit, solver, *(text for row in rows for text in measured(row))])
+        return Table(self.title, header, lines)
+
 
 def groups(runs: pd.DataFrame) -> Iterator[Group]:
     """The tables of a results folder."""
@@ -103,6 +117,13 @@ def time_text(row: pd.Series | None) -> str:
     steps = row["steps_asked"] - row["steps_done"]
     done = f" ({row['steps_done']:.0f}/{row['steps_asked']:.0f})" if steps else ""
     return f"{mark(row)}{seconds_text(row['solve_seconds_mean'])}{done}"
+
+
+def measured(row: pd.Series | None) -> tuple[str, str]:
+    """Time and accuracy; the time of what is optimal stands out."""
+    time = time_text(row)
+    optimal = row is not None and row["outcome"] == "optimal"
+    return Strong(time) if optimal else time, accuracy_text(row)
 
 
 def accuracy_text(row: pd.Series | None) -> str:
@@ -163,13 +184,16 @@ def scene(row: pd.Series) -> str:
     )
 
 
-def reasons(runs: pd.DataFrame) -> list[str]:
+def reasons(runs: pd.DataFrame) -> Document:
     """A line for each cell that is not optimal on every step, or not what its scene is about."""
-    return [
+    lines = [
         f"{scene(r)}, {r['mode']}, {r['solver']}: {r['outcome']}; {r['reason']}"
         for _, r in runs.iterrows()
         if r["reason"] and r["solver"] != UNCONSTRAINED
     ]
+    return Document(
+        "What kept a cell from optimal, or from what its scene is about", [Items(lines)]
+    )
 
 
 def older(runs: pd.DataFrame) -> list[str]:
@@ -182,9 +206,9 @@ def older(runs: pd.DataFrame) -> list[str]:
     return lines
 
 
-def details(runs: pd.DataFrame) -> list[str]:
+def details(runs: pd.DataFrame) -> Document:
     """A line for each cell whose solver tells more of its time, such as a modelling layer's."""
-    return [
+    lines = [
         f"{r['solver']}, {scene(r)}: "
         + ", ".join(
             f"{k.replace('_', ' ')} {v:.4f}" for k, v in json.loads(r["details_mean"]).items()
@@ -192,6 +216,7 @@ def details(runs: pd.DataFrame) -> list[str]:
         for _, r in runs.iterrows()
         if r["details_mean"]
     ]
+    return Document("Inside the solve, means", [Items(lines)])
 
 
 def ledger(runs: pd.DataFrame) -> pd.DataFrame:
@@ -202,94 +227,41 @@ def ledger(runs: pd.DataFrame) -> pd.DataFrame:
     return known["active_constraints_max"].max().reset_index()[[*same[:4], *sizes]]
 
 
-def ledger_lines(runs: pd.DataFrame) -> list[list[str]]:
-    """The same as text."""
-    return [[_size(value) for value in line] for line in ledger(runs).itertuples(index=False)]
-
-
-def _ledger_markdown(runs: pd.DataFrame) -> str:
+def ledger_table(runs: pd.DataFrame) -> Table:
+    """The same to be shown."""
     names = ["scene", "physics it needs", "mesh", "directions", "variables", "constraints"]
-    header = [*names, "active at most", "non-zeros"]
-    lines = [_line(header), _line(["---"] * len(header))]
-    lines += [_line([escape.markdown(v) for v in values]) for values in ledger_lines(runs)]
-    return "## Model ledger\n\n" + "\n".join(lines)
+    columns = [Column(name, form=".0f") for name in (*names, "active at most", "non-zeros")]
+    return replace(Table.of(ledger(runs)), title="Model ledger", header=columns)
 
 
-def _size(value: object) -> str:
-    """A number of a ledger, or a name; nothing for NaN."""
-    if not isinstance(value, float):
-        return str(value)
-    return "" if pd.isna(value) else f"{value:.0f}"
+SECTIONS: tuple[Callable[[pd.DataFrame], Part], ...] = (warm.table, reasons, details, ledger_table)
+"""What stands below the tables of times, in table1.md and on the page."""
+
+
+def as_document(
+    runs: pd.DataFrame,
+    machines: Mapping[str, Mapping[str, object]],
+    title: str = TITLE,
+    charts: Iterable[Path] = (),
+) -> Document:
+    """All tables, what their signs mean, the reasons of every failure, the machine."""
+    pictures = [Picture(path, path.stem) for path in charts]
+    parts: list[Part] = [
+        Prose(explanation(runs)),
+        Items(older(runs), Prose(OLDER)),
+        Document("Charts", pictures),
+        *(group.table() for group in groups(runs)),
+        *(section(runs) for section in SECTIONS),
+        machine_section(machines),
+    ]
+    return Document(title, parts)
 
 
 def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
-    """All tables, what their signs mean, the reasons of every failure, the machine."""
-    parts = ["# Table 1: seconds a projection, and the accuracy reached", explanation(runs)]
-    if lines := [f"- {escape.markdown(line)}" for line in older(runs)]:
-        parts.append(f"{OLDER}\n\n" + "\n".join(lines))
-    parts += [_markdown_group(group) for group in groups(runs)]
-    if twins := warm.pairs(runs):
-        lines = [_line(list(warm.HEADER)), _line(["---"] * len(warm.HEADER))]
-        lines += [_line([escape.markdown(text) for text in pair.line()]) for pair in twins]
-        parts.append("## Cold and warm starts\n\n" + warm.EXPLANATION + "\n\n" + "\n".join(lines))
-    if lines := [f"- {escape.markdown(reason)}" for reason in reasons(runs)]:
-        parts.append(f"## {REASONS}\n\n" + "\n".join(lines))
-    if lines := [f"- {escape.markdown(line)}" for line in details(runs)]:
-        parts.append("## Inside the solve, means\n\n" + "\n".join(lines))
-    parts.append(_ledger_markdown(runs))
-    parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
-    return "\n\n".join(parts) + "\n"
-
-
-def _markdown_group(group: Group) -> str:
-    header = ["limit", "method"]
-    for name in group.meshes:
-        header += [f"{escape.markdown(name)} [s]", "violation · gap · mm"]
-    lines = [f"## {escape.markdown(group.title)}", "", _line(header), _line(["---"] * len(header))]
-    if cells := [seconds_text(seconds) for seconds in group.implicit_euler()]:
-        lines.append(_line(["", "implicit Euler", *(t for c in cells for t in (c, ""))]))
-    for limit, solver, rows in group.blocks():
-        texts = []
-        for row in rows:
-            bold = "**" if row is not None and row["outcome"] == "optimal" else ""
-            texts += [f"{bold}{time_text(row)}{bold}", accuracy_text(row)]
-        lines.append(_line([escape.markdown(limit), escape.markdown(solver), *texts]))
-    return "\n".join(lines)
-
-
-def _line(cells: list[str]) -> str:
-    return "| " + " | ".join(cells) + " |"
-
-
-def machine_line(name: str, facts: Mapping[str, object]) -> str:
-    """A machine and its facts in one line of Markdown."""
-    packages = facts.get("packages")
-    versions = packages.items() if isinstance(packages, Mapping) else ()
-    return escape.markdown(
-        f"{name}: {facts['memory_gb']} GB, {facts['system']}, Python {facts['python']}, "
-        f"{facts['threads_per_solver']} thread a solver; "
-        + ", ".join(f"{package} {version}" for package, version in versions)
-    )
-
-
-def _latex_mesh(name: str) -> str:
-    return re.sub(r"^(\d+)\\texttimes\{\}(\d+)$", r"$\1\\times\2$", escape.latex(name))
+    """The same as a file, without charts."""
+    return markdown(as_document(runs, machines))
 
 
 def as_latex(runs: pd.DataFrame) -> str:
     """The times alone, as tabulars in the paper's shape."""
-    parts = []
-    for group in groups(runs):
-        columns = " & ".join(_latex_mesh(name) for name in group.meshes)
-        lines = [
-            f"% {escape.plain(group.title)}",
-            rf"\begin{{tabular}}{{ll{'r' * len(group.meshes)}}}",
-            rf"limit & method & {columns} \\ \hline",
-        ]
-        if euler := [seconds_text(seconds) for seconds in group.implicit_euler()]:
-            lines.append(" & ".join(["", "implicit Euler", *euler]) + r" \\")
-        for limit, solver, rows in group.blocks():
-            texts = [time_text(r) for r in rows]
-            lines.append(" & ".join([escape.latex(limit), escape.latex(solver), *texts]) + r" \\")
-        parts.append("\n".join([*lines, r"\end{tabular}"]))
-    return "\n\n".join(parts) + "\n"
+    return latex(group.table() for group in groups(runs))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from strainbench.document import Prose, Table
 from strainbench.report.numbers import distance_text
 
 HEADER = ("scene", "limit", "method", "seconds, cold / warm", "iterations", "distance [mm]")
@@ -61,6 +62,12 @@ def pairs(runs: pd.DataFrame) -> list[Pair]:
     warm = [r for _, r in runs.iterrows() if starts_warm(r)]
     keys = [(*r[same], r["solver"].removesuffix(SUFFIX)) for r in warm]
     return [Pair(cold[k], r) for k, r in zip(keys, warm, strict=True) if k in cold]
+
+
+def table(runs: pd.DataFrame) -> Table:
+    """A line a pair."""
+    lines = [pair.line() for pair in pairs(runs)]
+    return Table("Cold and warm starts", HEADER, lines, Prose(EXPLANATION))
 
 
 def beside_twins(solvers: list[str]) -> list[str]:

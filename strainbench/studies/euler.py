@@ -18,9 +18,10 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from strainbench.arrays import FloatArray
+from strainbench.document import Column, Table
+from strainbench.document.writers import terminal
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
 from strainbench.physics.integrators import Motion, Project, step_and_project
@@ -30,6 +31,12 @@ from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.stage import Stage
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solver
+
+HEADER = (
+    *("solver", "converged", "iterations", "factor.", "evaluations", "step [ms]"),
+    *("assembly", "factorisation", "line search", "other", "ratio", "worst"),
+)
+CAPTION = "medians over the steps; ratio: step / (assemb. + factor.)"
 
 
 @dataclass(frozen=True)
@@ -87,11 +94,7 @@ def _measure(
 
 def table(measured: dict[str, list[Measured]], title: str) -> Table:
     """A row a linear solver."""
-    grid = Table(title=title, caption="medians over the steps; ratio: step / (assemb. + factor.)")
-    for name in ("solver", "converged", "iterations", "factor.", "evaluations", "step [ms]"):
-        grid.add_column(name, justify="right")
-    for name in ("assembly", "factorisation", "line search", "other", "ratio", "worst"):
-        grid.add_column(name, justify="right")
+    lines = []
     for name, steps in measured.items():
         reports = [m.report for m in steps]
         parts = {
@@ -103,18 +106,20 @@ def table(measured: dict[str, list[Measured]], title: str) -> Table:
             median(s / m.seconds for s, m in zip(seconds, steps, strict=True))
             for seconds in parts.values()
         ]
-        grid.add_row(
-            name,
-            f"{sum(r.converged for r in reports)}/{len(reports)}",
-            f"{median(r.iterations for r in reports):g}",
-            f"{median(r.factorisations for r in reports):g}",
-            f"{median(r.evaluations for r in reports):g}",
-            f"{1e3 * median(m.seconds for m in steps):.2f}",
-            *(f"{share:.1%}" for share in [*shares, 1 - sum(shares)]),
-            f"{median(m.ratio for m in steps):.2f}",
-            f"{max(m.ratio for m in steps):.2f}",
+        lines.append(
+            (
+                name,
+                f"{sum(r.converged for r in reports)}/{len(reports)}",
+                f"{median(r.iterations for r in reports):g}",
+                f"{median(r.factorisations for r in reports):g}",
+                f"{median(r.evaluations for r in reports):g}",
+                f"{1e3 * median(m.seconds for m in steps):.2f}",
+                *(f"{share:.1%}" for share in [*shares, 1 - sum(shares)]),
+                f"{median(m.ratio for m in steps):.2f}",
+                f"{max(m.ratio for m in steps):.2f}",
+            )
         )
-    return grid
+    return Table(title, [Column(name, right=True) for name in HEADER], lines, notes=[CAPTION])
 
 
 def run(
@@ -136,7 +141,7 @@ def run(
     profile(small, 1)  # compiles
     measured = profile(scene, steps, project)
     title = f"{name} {resolution}x{resolution}, {steps} steps of {step:.4g} s, solver {solver}"
-    Console(width=150).print(table(measured, title))
+    Console(width=150).print(terminal(table(measured, title)))
 
 
 if __name__ == "__main__":

@@ -9,7 +9,9 @@ import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS
 from strainbench.bench.records import RUNS, RecordsError, append_rows
-from strainbench.report.compare import CSV_HEADER, compare, write_comparison
+from strainbench.document.writers import csv as as_csv
+from strainbench.report.compare import CSV_HEADER, compare
+from strainbench.report.output import write_output
 from tests.cli.test_cli import strainbench
 from tests.report.test_report import row
 
@@ -56,7 +58,7 @@ def test_ratios_are_of_cells_that_both_finished(found):
 
 
 def test_changes_are_shown_and_what_stays_is_shown_once(found):
-    lines = {line[2]: line for _, lines in found.groups() for line in lines}
+    lines = {line[2]: line for table in found.tables() for line in table.lines}
     assert lines["worse"][3:] == (
         *("optimal → violated", "0.0200", "0.0400", "2.00"),
         *("3e-9 → 2e-3", "2e-6"),
@@ -90,18 +92,18 @@ def test_other_machines_are_said_first(tmp_path):
 
 
 def test_csv_and_markdown(found, tmp_path):
-    rows = list(csv.DictReader(io.StringIO(found.csv())))
+    rows = list(csv.DictReader(io.StringIO(as_csv(found.cells()))))
     assert tuple(rows[0]) == CSV_HEADER
     assert [r["only_in"] for r in rows].count("") == 5
     worse = next(r for r in rows if r["solver"] == "worse")
     assert float(worse["max_violation_b"]) == 2e-3
     assert float(worse["seconds_ratio"]) == 2.0
     for name in ("c.csv", "c.md"):
-        write_comparison(found, tmp_path / "new folder" / name)
+        write_output(tmp_path / "new folder" / name, found.document(), found.cells())
     text = (tmp_path / "new folder/c.md").read_text()
     assert "| 10×10 | 1% | worse | optimal → violated | 0.0200 | 0.0400 | 2.00 |" in text
     with pytest.raises(ValueError, match=r"ends in .csv, .md is valid"):
-        write_comparison(found, tmp_path / "c.html")
+        write_output(tmp_path / "c.html", found.document(), found.cells())
 
 
 def test_a_folder_without_results(tmp_path):
@@ -115,7 +117,7 @@ def test_the_command_line(found, tmp_path):
     assert done.returncode == 0, done.stderr
     for text in ("5 cells in both", "worse", "only in B", "wrote c.csv"):
         assert text in done.stdout
-    assert (tmp_path / "c.csv").read_text() == found.csv()
+    assert (tmp_path / "c.csv").read_text() == as_csv(found.cells())
 
 
 @pytest.mark.parametrize(
@@ -132,6 +134,6 @@ def test_what_does_not_compare_is_in_no_mean(tmp_path, change):
 def test_cells_of_other_step_sizes_are_in_other_tables(tmp_path):
     rows = [row("one", scenario_parameters=f'{{"step": {h}}}') for h in (0.01666, 0.016664)]
     a = folder(tmp_path / "a", *rows)
-    titles = [title for title, _ in compare(a, a).groups()]
+    titles = [table.title for table in compare(a, a).tables()]
     assert ["step 0.01666," in t for t in titles] == [True, False]
     assert ["step 0.016664," in t for t in titles] == [False, True]

@@ -11,9 +11,11 @@ import pytest
 from strainbench import Solution, Solver
 from strainbench.bench.plan import plan_one
 from strainbench.bench.recording import record, record_all, recorded, recorder
+from strainbench.document.writers import markdown
+from strainbench.report.output import check_ending
 from strainbench.solver.registry import find_solver
 from strainbench.studies.duel.measure import Racer, duel, parse_frames
-from strainbench.studies.duel.report import CSV_HEADER, HEADER, Outcome, check_ending
+from strainbench.studies.duel.report import CSV_HEADER, HEADER, Outcome
 from tests.cli.test_cli import strainbench
 
 MACHINE = {
@@ -140,16 +142,16 @@ def test_ratios_and_units():
     assert (first["first_quartile"], first["third_quartile"]) == pytest.approx((3.0, 5.0))
     assert [r["times_faster"] for r in (first, second, unit)] == pytest.approx([1, 0.5, 8])
     assert [r["per_factorisation"] for r in (first, second, unit)] == pytest.approx([8, 16, 1])
-    header, *lines = found.lines()
-    assert header == tuple(h for h in HEADER if h != "/ implicit Euler")
-    assert all(len(line) == len(header) for line in lines)
+    table = found.table()
+    assert table.columns == [c for c in HEADER.values() if c.name != "/ implicit Euler"]
+    assert all(len(line) == len(table.columns) for line in table.lines)
     for text in ("strainbench duel", "here: 1 GB", "| second | 0.1 | 8 | 8 to 8 | 0.50 |"):
-        assert text in found.markdown()
+        assert text in markdown(found.document())
 
 
 def test_no_columns_for_units_that_were_not_measured():
-    header = outcome(Racer("only", [1.0], [1.0])).lines()[0]
-    assert not [name for name in header if name.startswith("/")]
+    headings = outcome(Racer("only", [1.0], [1.0])).table().headings
+    assert not [name for name in headings if name.startswith("/")]
 
 
 def test_another_ending():

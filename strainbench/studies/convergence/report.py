@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +16,11 @@ from strainbench import escape
 from strainbench.bench.columns import WORDS
 from strainbench.bench.ending import Ending
 from strainbench.bench.records import RecordsError, read_machines, read_rows
+from strainbench.document import Column, Document, Items, Part, Prose, Table
+from strainbench.document.writers import markdown
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
-from strainbench.report.table import machine_line, power
+from strainbench.report.machine import machine_section
+from strainbench.report.table import power
 from strainbench.studies.convergence.measure import CANDIDATE, COLUMNS, CONVERGENCE
 
 LEVELS = (1e-2, 1e-4, 1e-6)
@@ -84,46 +87,45 @@ def write_convergence(folder: Path) -> list[Path]:
     """Write convergence.md, .svg and .png; return their paths."""
     table = load_convergence(folder)
     text = folder / "convergence.md"
-    text.write_text(as_markdown(table, read_machines(folder)), encoding="utf-8")
+    text.write_text(markdown(as_document(table, read_machines(folder))), encoding="utf-8")
     return [text, *draw_convergence(table, folder / "convergence")]
 
 
-def as_markdown(table: pd.DataFrame, machines: Any) -> str:
+def as_document(table: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> Document:
     """Seconds and iterations to reach each level of gap and violation."""
     first = table.iloc[0]
-    title = f"{first['scenario']}, projection {first['frame']:.0f}"
-    parts = [
-        f"# Convergence: {escape.markdown(title)}",
-        f"{first['variables']:.0f} variables, {first['constraints']:.0f} constraints. "
-        + EXPLANATION.replace("\n", " "),
+    sizes = f"{first['variables']:.0f} variables, {first['constraints']:.0f} constraints. "
+    endings = [f"{name}: {rows.ending.iloc[0]}" for name, rows in methods(table)]
+    parts: list[Part] = [
+        Prose(sizes + EXPLANATION.replace("\n", " ")),
+        _table(table, "relative_gap", "relative gap"),
+        _table(table, "max_violation", "violation"),
+        Document("How each ended", [Items(endings)]),
+        machine_section(machines),
     ]
-    for measure, name in (("relative_gap", "relative gap"), ("max_violation", "violation")):
-        parts.append(f"## To reach a {name}\n\n" + _table(table, measure))
-    endings = [
-        f"- {escape.markdown(f'{name}: {rows.ending.iloc[0]}')}" for name, rows in methods(table)
-    ]
-    parts.append("## How each ended\n\n" + "\n".join(endings))
-    parts.append("## Machine\n\n" + "\n".join(machine_line(n, f) for n, f in machines.items()))
-    return "\n\n".join(parts) + "\n"
+    return Document(f"Convergence: {_title(first)}", parts)
 
 
-def _table(table: pd.DataFrame, measure: str) -> str:
+def _title(sample: pd.Series) -> str:
+    return f"{sample['scenario']}, projection {sample['frame']:.0f}"
+
+
+def _table(table: pd.DataFrame, measure: str, name: str) -> Table:
     """A line a method: seconds and iterations to each level, and the least that it reached."""
-    header = ["method"]
-    for level in LEVELS:
-        header += [f"{power(level)} [s]", "iterations"]
-    lines = [[*header, "at the end"], ["---"] * (len(header) + 1)]
-    for name, rows in methods(table):
-        line = [escape.markdown(name)]
-        for level in LEVELS:
-            at = reached(rows, measure, level)
-            line += [unreached(rows), ""] if at is None else _effort(at)
-        last = rows[measure].iloc[-1]
-        lines.append([*line, "-" if pd.isna(last) else power(last)])
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    columns = [c for level in LEVELS for c in (Column(power(level), "s"), "iterations")]
+    lines = []
+    for label, rows in methods(table):
+        efforts = [text for level in LEVELS for text in _effort(rows, measure, level)]
+        lines.append([label, *efforts, rows[measure].iloc[-1]])
+    header = ["method", *columns, Column("at the end", form=power)]
+    return Table(f"To reach a {name}", header, lines, nothing="-")
 
 
-def _effort(sample: pd.Series) -> list[str]:
+def _effort(rows: pd.DataFrame, measure: str, level: float) -> list[str]:
+    """Seconds and iterations to a level."""
+    sample = reached(rows, measure, level)
+    if sample is None:
+        return [unreached(rows), ""]
     return [f"{sample['seconds']:.2g}", f"{sample['iterations']:.0f}"]
 
 
@@ -150,7 +152,7 @@ def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
         row[0].set_ylabel(name)
     for ax, (_, name) in zip(axes[-1], AXES, strict=True):
         ax.set_xlabel(name)
-    figure.suptitle(escape.chart(f"{start['scenario']}, projection {start['frame']:.0f}"), size=11)
+    figure.suptitle(escape.chart(_title(start)), size=11)
     handles = [
         Line2D([], [], label=escape.chart(n), **_line(n.endswith("°")), **style[n])
         for n, _ in drawn

@@ -1,19 +1,14 @@
-"""The outcome of a duel: a table for the terminal, Markdown, CSV."""
+"""The outcome of a duel: one table, read and as CSV."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
+from math import isnan
 
-from rich import box
-from rich.table import Table
-
-from strainbench import escape
-from strainbench.bench.records import open_folder
-from strainbench.report.table import machine_line, power
+from strainbench.document import Column, Document, Prose, Table
+from strainbench.report.machine import machine_line
+from strainbench.report.table import power
 from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER, Racer
 
 EXPLANATION = (
@@ -22,36 +17,25 @@ EXPLANATION = (
     "over that of the row. Violation and gap are the referee's, the worst over the frames."
 )
 CSV_HEADER = (
-    "method",
-    "setup_seconds",
-    "seconds",
-    "first_quartile",
-    "third_quartile",
-    "times_faster",
-    "iterations",
-    "max_violation",
-    "relative_gap",
-    "per_factorisation",
-    "per_implicit_euler",
-    "projections",
-    "says",
-    "machine",
-    "command",
+    *("method", "setup_seconds", "seconds", "first_quartile", "third_quartile", "times_faster"),
+    *("iterations", "max_violation", "relative_gap", "per_factorisation", "per_implicit_euler"),
+    *("projections", "says", "machine", "command"),
 )
-
-HEADER = (
-    "method",
-    "set-up [s]",
-    "projection [s]",
-    "quartiles",
-    "times faster",
-    "iterations",
-    "violation",
-    "gap",
-    "/ factor. + solve",
-    "/ implicit Euler",
-    "says",
-)
+HEADER = {
+    "method": Column("method", whole=True),
+    "setup_seconds": Column("set-up", "s", ".3g"),
+    "seconds": Column("projection", "s", ".3g"),
+    "quartiles": Column("quartiles"),
+    "times_faster": Column("times faster", form=".2f"),
+    "iterations": Column("iterations", form="g"),
+    "max_violation": Column("violation", form=power),
+    "relative_gap": Column("gap", form=power),
+    "per_factorisation": Column("/ factor. + solve", form=".2f"),
+    "per_implicit_euler": Column("/ implicit Euler", form=".2f"),
+    "says": Column("says"),
+}
+UNITS = {"per_factorisation": FACTORISATION, "per_implicit_euler": IMPLICIT_EULER}
+"""Columns of ratios to the time of something else, and how its entry begins."""
 
 
 @dataclass(frozen=True)
@@ -70,13 +54,16 @@ class Outcome:
     machines: Mapping[str, Mapping[str, object]]
     entries: Sequence[Racer]
 
+    @property
+    def units(self) -> dict[str, float]:
+        """[s] of what times are compared with; NaN where it was not measured."""
+        return {
+            name: next((e.median for e in self.entries if e.label.startswith(start)), float("nan"))
+            for name, start in UNITS.items()
+        }
+
     def rows(self) -> Iterator[dict[str, object]]:
         """One an entry, by the columns of CSV_HEADER; NaN where there is nothing."""
-        nan = float("nan")
-        units = {
-            name: next((e.median for e in self.entries if e.label.startswith(name)), nan)
-            for name in (FACTORISATION, IMPLICIT_EULER)
-        }
         for entry in self.entries:
             values = (
                 entry.label,
@@ -87,7 +74,7 @@ class Outcome:
                 entry.iterations,
                 entry.worst_violation,
                 entry.worst_gap,
-                *(entry.median / seconds for seconds in units.values()),
+                *(entry.median / seconds for seconds in self.units.values()),
                 len(entry.seconds),
                 "; ".join(entry.unsolved),
                 next(iter(self.machines)),
@@ -95,78 +82,30 @@ class Outcome:
             )
             yield dict(zip(CSV_HEADER, values, strict=True))
 
-    def lines(self) -> list[tuple[str, ...]]:
-        """Header and cells as text; columns of units only where these were measured."""
-        table: list[tuple[str, ...]] = [HEADER]
-        for row in self.rows():
-            number = {k: v for k, v in row.items() if isinstance(v, float)}
-            quartiles = [_text(number[k], ".3g") for k in ("first_quartile", "third_quartile")]
-            table.append(
-                (
-                    str(row["method"]),
-                    _text(number["setup_seconds"], ".3g"),
-                    _text(number["seconds"], ".3g"),
-                    " to ".join(quartiles),
-                    _text(number["times_faster"], ".2f"),
-                    _text(number["iterations"], "g"),
-                    *(_power(number[k]) for k in ("max_violation", "relative_gap")),
-                    *(_text(number[k], ".2f") for k in ("per_factorisation", "per_implicit_euler")),
-                    str(row["says"]),
-                )
-            )
-        kept = [c for c in zip(*table, strict=True) if c[0][0] != "/" or set(c[1:]) != {"-"}]
-        return list(zip(*kept, strict=True))
-
     def table(self) -> Table:
-        """For the terminal."""
-        header, *lines = self.lines()
-        grid = Table(title=escape.terminal(self.title), title_justify="left", box=box.MARKDOWN)
-        for name in header:
-            grid.add_column(name, no_wrap=True)
-        for line in lines:
-            grid.add_row(*map(escape.terminal, line))
-        return grid
+        """To be read; columns of units only where these were measured."""
+        missing = {name for name, seconds in self.units.items() if isnan(seconds)}
+        shown = {name: column for name, column in HEADER.items() if name not in missing}
+        rows = (row | {"quartiles": _quartiles(row)} for row in self.rows())
+        return Table(
+            self.title,
+            list(shown.values()),
+            [[row[name] for name in shown] for row in rows],
+            about=Prose(EXPLANATION),
+            command=self.command,
+            nothing="-",
+        )
 
-    def markdown(self) -> str:
+    def document(self) -> Document:
         """All of it, with command and machine."""
-        header, *lines = self.lines()
-        rows = [header, ("---",) * len(header), *(map(escape.markdown, line) for line in lines)]
-        parts = [
-            f"# Duel: {escape.markdown(self.title)}",
-            escape.code(self.command),
-            EXPLANATION,
-            "\n".join(f"| {' | '.join(row)} |" for row in rows),
-            "\n".join(machine_line(name, facts) for name, facts in self.machines.items()),
-        ]
-        return "\n\n".join(parts) + "\n"
+        machines = [machine_line(name, facts) for name, facts in self.machines.items()]
+        return Document(f"Duel: {self.title}", [replace(self.table(), title=""), *machines])
 
-    def csv(self) -> str:
+    def cells(self) -> Table:
         """One line an entry."""
-        buffer = io.StringIO()
-        writer = csv.DictWriter(buffer, CSV_HEADER, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows({k: escape.cell(v) for k, v in row.items()} for row in self.rows())
-        return buffer.getvalue()
+        return Table("", CSV_HEADER, [list(row.values()) for row in self.rows()])
 
 
-def _text(value: float, form: str) -> str:
-    return "-" if value != value else format(value, form)
-
-
-def _power(value: float) -> str:
-    return "-" if value != value else power(value)
-
-
-def check_ending(path: Path) -> None:
-    """ValueError for a name whose ending says no form."""
-    if path.suffix not in (".csv", ".md"):
-        raise ValueError(f"-o {path}: a name that ends in .csv, .md is valid")
-    open_folder(path.parent, "-o")
-
-
-def write_outcome(outcome: Outcome, path: Path) -> None:
-    """As CSV or Markdown, by what the name ends in."""
-    check_ending(path)
-    path.write_text(
-        outcome.csv() if path.suffix == ".csv" else outcome.markdown(), encoding="utf-8"
-    )
+def _quartiles(row: Mapping[str, object]) -> str:
+    ends = (HEADER["seconds"].text(row[f"{name}_quartile"], "-") for name in ("first", "third"))
+    return " to ".join(ends)

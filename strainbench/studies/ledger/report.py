@@ -8,21 +8,23 @@ from pathlib import Path
 
 import pandas as pd
 
-from strainbench import escape
 from strainbench.bench.cell import Cell
 from strainbench.bench.machine import describe_machine
 from strainbench.bench.records import open_folder, remember_machine
+from strainbench.document import Column, Document, Prose, Table
+from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
-from strainbench.render.film import Track, untracked
+from strainbench.progress import Track, untracked
 from strainbench.studies.ledger.measure import AS_IT_IS, PARTS, Row, account
 
 MODELS = (
-    "scene, needs, cells, variables, constraints, active, non-zeros of the constraints, "
-    "of the energy's Hessian, Newton iterations"
+    *("scene", "needs", "cells", "variables", "constraints", "active"),
+    *("non-zeros of the constraints", "of the energy's Hessian", "Newton iterations"),
 )
 EFFECTS = (
-    "scene, change, farthest vertex [mm], in edge lengths, energy [mJ], active, "
-    "Hessian's non-zeros, Newton iterations, after step, "
+    *("scene", "change", Column("farthest vertex", "mm", ".2g")),
+    *(Column("in edge lengths", form=".2g"), Column("energy", "mJ", ".2g"), "active"),
+    *("Hessian's non-zeros", "Newton iterations", "after step", ""),
 )
 EXPLANATION = (
     "How far the farthest vertex is from where it is in the scene as it is, and how much more "
@@ -52,7 +54,7 @@ def write_ledger(cells: Sequence[Cell], folder: Path, track: Track = untracked) 
         rows = list(track(plays, "playing", len(cells) * (2 + len(PARTS))))
         remember_machine(folder, name, facts)
         table = pd.DataFrame([asdict(row) for row in rows]).convert_dtypes()
-        write_whole(paths[0], table.map(escape.cell).to_csv(index=False).encode())
+        write_whole(paths[0], csv(Table.of(table)).encode())
         write_whole(paths[1], as_markdown(rows, about).encode())
     return paths
 
@@ -69,9 +71,8 @@ def as_markdown(rows: list[Row], about: str) -> str:
         for r in rows
         if r.change != AS_IT_IS
     ]
-    parts = ["# Model ledger", escape.markdown(about), _table(MODELS, models)]
-    parts += ["## What each part changes", EXPLANATION, _table(EFFECTS, effects)]
-    return "\n\n".join(parts) + "\n"
+    changes = Table("What each part changes", EFFECTS, effects, Prose(EXPLANATION))
+    return markdown(Document("Model ledger", [about, Table("", MODELS, models), changes]))
 
 
 def _sparsity(row: Row) -> tuple[int | None, int | None, int | None]:
@@ -87,15 +88,3 @@ def _effort(row: Row) -> tuple[object, ...]:
         row.compared_after,
         (row.note + failures).removeprefix("; "),
     )
-
-
-def _table(header: str, rows: Sequence[tuple[object, ...]]) -> str:
-    lines = [header.split(", "), ["---"] * (header.count(", ") + 1)]
-    lines += [[_text(value) for value in row] for row in rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
-def _text(value: object) -> str:
-    if value is None:
-        return ""
-    return f"{value:.2g}" if isinstance(value, float) else escape.markdown(value)

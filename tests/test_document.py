@@ -1,0 +1,161 @@
+"""One table through every writer: what it holds is shown as it is, and is markup in none."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from html import unescape
+
+import pandas as pd
+import pytest
+from hypothesis import given
+from markdown_it import MarkdownIt
+from rich import box
+from rich.console import Console
+
+from strainbench import escape
+from strainbench.document import (
+    Code,
+    Column,
+    Document,
+    Items,
+    Picture,
+    Prose,
+    Strong,
+    Table,
+    writers,
+)
+from strainbench.document.page import page
+from tests.test_escape import TEXTS, Text, text
+
+COLUMNS = [
+    "method",
+    Column("time", "s", ".3g", right=True, whole=True),
+    Column("said", aside=True),
+    Column("share", form=lambda share: f"{share:.0%}"),
+]
+LINES = [("newton", 1.23456, "a", 0.5), (Strong("best"), 2, None, float("nan"))]
+TABLE = Table("Times", COLUMNS, LINES, Prose("Of *one* run."), ["a note"], "run --it", "-")
+
+
+def on_terminal(table, width=2000, **look):
+    file = io.StringIO()
+    Console(file=file, width=width).print(writers.terminal(table, **look))
+    return file.getvalue()
+
+
+def test_a_table_in_markdown():
+    assert writers.markdown(TABLE) == (
+        "# Times\n\n`run --it`\n\nOf *one* run.\n\n"
+        "| method | time [s] | said | share |\n"
+        "| --- | ---: | --- | --- |\n"
+        "| newton | 1.23 | a | 50% |\n"
+        "| **best** | 2 | - | - |\n\n"
+        "- a note\n"
+    )
+
+
+def test_a_table_in_latex_has_no_column_that_stands_aside():
+    assert writers.latex([TABLE]) == (
+        "% Times\n% run --it\n\\begin{tabular}{lrl}\n"
+        "method & time [s] & share \\\\ \\hline\n"
+        "newton & 1.23 & 50\\% \\\\\n"
+        "\\textbf{best} & 2 & - \\\\\n"
+        "\\end{tabular}\n"
+    )
+
+
+def test_csv_has_every_digit():
+    table = Table.of(pd.DataFrame({"a": [1 / 3, float("nan")], "b": [1, 2], "c": ["=x", None]}))
+    assert writers.csv(table) == f"a,b,c\n{1 / 3},1,'=x\n,2,\n"
+
+
+@pytest.mark.parametrize("look", [box.MARKDOWN, box.SIMPLE_HEAD])
+def test_a_narrow_terminal_folds_what_may_be_folded(look):
+    shown = on_terminal(TABLE, 30, look=look)
+    for words in ("Times", "time [s]", "1.23", "a note"):
+        assert words in shown
+    assert max(map(len, shown.splitlines())) <= 30
+
+
+def test_a_page_has_headings_classes_and_what_prose_marks():
+    shown = page(Document("All", [TABLE, Code("a <b>"), Items(["one"], "these:")]))
+    for words in (
+        *("<title>All</title>", "<h1>All</h1>", "<h2>Times</h2>", "<p>Of <em>one</em> run.</p>"),
+        *('<th class="right">time [s]</th>', '<td class="right">1.23</td>', '<td class="aside">a'),
+        *("<strong>best</strong>", "<code>a &lt;b&gt;</code>", "<p>these:</p>", "<li>one</li>"),
+    ):
+        assert words in shown
+
+
+def test_pictures(tmp_path):
+    (tmp_path / "a.svg").write_text("<?xml?><svg>here</svg>")
+    drawn = Document("Charts", [Picture(tmp_path / "a.svg", "a [chart]")])
+    assert '<div class="wide"><svg>here</svg></div>' in page(drawn)
+    html = MarkdownIt("commonmark").render(writers.markdown(drawn))
+    assert 'alt="a [chart]"' in html
+    assert "a.svg" in html
+
+
+def test_what_is_empty_is_left_out_with_its_title():
+    empty = [Table("none", ["a"], [], "about", ["note"]), Items([], "head"), Document("in", [""])]
+    parts = [*empty, Document("deep", [Document("deeper", ["words"])])]
+    assert writers.markdown(Document("All", parts)) == ("# All\n\n## deep\n\n### deeper\n\nwords\n")
+
+
+def test_a_line_of_another_length_is_noticed():
+    with pytest.raises(ValueError, match="zip"):
+        writers.markdown(Table("", ["a", "b"], [["alone"]]))
+
+
+# --- hostile text, in each place that takes text
+
+
+def everywhere(words):
+    table = Table(
+        words, [words, Column(words, words)], [[words, Strong(words)]], words, [words], words, words
+    )
+    return Document(words, [table, Items([words], words), Code(words), words])
+
+
+@pytest.mark.parametrize("words", TEXTS)
+def test_markdown_reads_as_the_text(words):
+    written = writers.markdown(everywhere(words))
+    html = MarkdownIt("commonmark").enable(["table", "strikethrough"]).render(written)
+    ours = {"h1", "h2", "p", "code", "table", "thead", "tbody", "tr", "th", "td", "strong", "ul"}
+    assert set(re.findall(r"<(\w+)", html)) == ours | {"li"}
+    assert unescape(html).count(escape.plain(words)) == 14
+
+
+@given(text)
+def test_a_page_takes_any_text(words):
+    plain = escape.plain(words)
+    shown = Text(page(everywhere(words)))
+    assert shown.tags <= {
+        *("html", "head", "meta", "title", "style", "body", "div", "h1", "h2", "p", "code"),
+        *("table", "tr", "th", "td", "strong", "ul", "li"),
+    }
+    pieces = [piece.strip() for piece in shown.text]
+    assert not plain or pieces.count(plain) == 13
+
+
+@pytest.mark.parametrize("words", TEXTS)
+def test_latex_has_no_character_that_means_something(words):
+    written = writers.latex([everywhere(words).parts[0]])
+    plain, latex = escape.plain(words), escape.latex(words)
+    assert written.splitlines()[:2] == [f"% {plain}"] * 2
+    assert f"{latex} & \\textbf{{{latex}}} \\\\" in written
+
+
+@pytest.mark.parametrize("words", TEXTS)
+def test_csv_has_no_formula(words):
+    header, line = csv.reader(io.StringIO(writers.csv(everywhere(words).parts[0])))
+    assert header[0] == line[0] == line[1] == escape.cell(words)
+
+
+@pytest.mark.parametrize("words", TEXTS)
+def test_a_terminal_shows_the_text(words):
+    shown = on_terminal(everywhere(words).parts[0])
+    assert shown.count(escape.plain(words)) == 7  # the column has it twice
+    assert "\x1b" not in shown
