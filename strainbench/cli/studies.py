@@ -157,8 +157,7 @@ def let_duel(
         entry.label = cell.solver.label
     title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
     outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
-    wide = Console(width=max(console.width, 200))  # its columns are many
-    wide.print(terminal(outcome.table()))
+    Console(width=max(console.width, 200)).print(terminal(outcome.table()))  # many columns
     if output is not None:
         write_output(output, outcome.document(), outcome.cells())
         say(f"wrote {output}")
