@@ -186,11 +186,7 @@ multipliers have no bound, and the referee's may price a violation higher than t
     ) -> tuple[Solution, float]:
         """Steps 2 to 6; and the least error, which is the solution's."""
         iterate = Iterate(problem, state, warm, tolerance)
-        warm = resumed = warm and state.snapshot is not None
-        if warm:
-            iterate.resume()
-        else:
-            iterate.start()
+        warm = resumed = iterate.begin()
         best, best_at, kept = np.inf, 0, None
         status = "iteration limit"
         for k in range(self.max_iterations + 1):

@@ -19,6 +19,7 @@ import numpy as np
 from solvers.newton_ipm.matrix import Slots, spread_blocks
 from solvers.newton_ipm.mesh import ROUNDING, Change, Sums, add_sums
 from solvers.newton_ipm.symmetric import (
+    after,
     congruent,
     dot,
     eigenvalues,
@@ -94,9 +95,7 @@ class ExactCones:
 
     def measure(self, y_target: FloatArray, Y: FloatArray, pull: FloatArray) -> Sums:
         """L Y (2e, 3) is filled, and G^T L Y added to `pull` (n, 3)."""
-        shape = self.at.y.shape
-        sums = (self.b, y_target.reshape(shape), Y.reshape(shape), pull)
-        return measure(self._G, self.at, *sums)
+        return measure(self._G, self.at, self.b, y_target, Y.reshape(self.at.y.shape), pull)
 
     def assemble(self, values: FloatArray) -> float:
         """Add the constraints' part of K to the matrix's values; <S, L>."""
@@ -232,12 +231,6 @@ def aim_again(
         for i in range(3):
             c[e, i] -= error[i]
             at.r[e, i] -= square[e, i]
-
-
-@compiled
-def after(d: FloatArray, A: FloatArray, a: float, e: int) -> tuple[float, float, float]:
-    """diag(d) + a A of element e."""
-    return d[e, 0] + a * A[e, 0], d[e, 1] + a * A[e, 1], a * A[e, 2]
 
 
 @compiled

@@ -71,6 +71,15 @@ class Iterate:
             np.maximum(self.cones.excess(), 0.0),
         )
 
+    def begin(self) -> bool:
+        """Resume where a snapshot is kept and there is one, else start; which of them it was."""
+        resumed = self.keep and self.state.snapshot is not None
+        if resumed:
+            self.resume()
+        else:
+            self.start()
+        return resumed
+
     def start(self) -> None:
         """From the target, with products of a guess: the violation over the size of the mesh."""
         problem = self.problem

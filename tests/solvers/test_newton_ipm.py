@@ -373,7 +373,7 @@ def test_the_matrix_is_the_derivative_of_the_condition_that_it_solves(exact):
         cones.place(problem.bounds, moved)
         cones.start(0.0, mu)
         Y, pull = np.zeros((problem.rows, 3)), np.zeros_like(moved)
-        cones.measure(Y, Y, pull)
+        cones.measure(cones.at.y, Y, pull)
         return (problem.weights[:, None] * (moved - problem.target) + pull)[free].ravel()
 
     expected = central_difference(gradient, x, 1e-5 * problem.edge_length)[:, free].reshape(
