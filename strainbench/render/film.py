@@ -10,11 +10,14 @@ import numpy as np
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.physics.energies.contact import Obstacle
+from strainbench.problem.kinds import Sampled
 from strainbench.problem.problem import Problem
 from strainbench.progress import Track as Track
 from strainbench.progress import untracked as untracked
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.stage import Stage, StageError, Who
+
+KEPT = 1e-4  # strain beyond a limit that is told as a power of ten
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +59,19 @@ def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
     """(e, dim) singular values of each deformation gradient, the largest first."""
     F = problem.deformation_gradients(positions)
     return np.asarray(np.linalg.svd(F, compute_uv=False), dtype=np.float64)
+
+
+def measured(problem: Problem, positions: FloatArray) -> str:
+    """What was limited and how well, and how far the cloth is stretched in any direction."""
+    bounds, sampled = problem.kind.bounds, isinstance(problem.kind, Sampled)
+    ends = dict.fromkeys(f"{100 * (b - 1):.3g}%" for b in (bounds.min(), bounds.max()))
+    excess = float(problem.violations(positions).max())
+    kept = f"up to {100 * excess:.2g}% beyond" if excess >= KEPT else f"within {excess:.0e} of"
+    what = f"{len(problem.limits.directions)} sampled directions" if sampled else "limited stretch"
+    largest = float(principal_stretches(problem, positions).max()) - 1
+    between = sampled and len(ends) == 1 and largest > bounds.max() - 1 + excess
+    rest = "between them up to" if between else "largest strain"
+    return f"{what} {kept if excess else 'within'} {' to '.join(ends)}; {rest} {100 * largest:.3g}%"
 
 
 def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
