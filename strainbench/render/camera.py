@@ -69,15 +69,8 @@ class Window:
         """[m]."""
         return self.pixel * self.size[1]
 
-    def pixels(self, seen: FloatArray, samples: int = 1) -> FloatArray:
-        """(n, 3) pixels from the left and from above, and depth in pixels, of points `seen`.
-
-        Parameters
-        ----------
-        samples : parts that a pixel's side is cut into, each counted as a pixel
-        """
+    def pixels(self, seen: FloatArray) -> FloatArray:
+        """(n, 3) pixels from the left and from above, and depth in pixels, of points `seen`."""
         left, bottom = self.corner
-        right, up, depth = (seen * (samples / self.pixel)).T
-        x = right - left * samples / self.pixel
-        y = (bottom + self.height) * samples / self.pixel - up
-        return np.column_stack([x, y, depth])
+        x, y = seen[:, 0] - left, bottom + self.height - seen[:, 1]
+        return np.column_stack([x, y, seen[:, 2]]) / self.pixel

@@ -6,6 +6,7 @@ Camera and colour scale are chosen once for a whole film.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from strainbench.escape import chart
 from strainbench.render.camera import Camera
-from strainbench.render.film import Film, measured
+from strainbench.render.film import Film
 from strainbench.render.paint import greyer
 from strainbench.render.stage import PIN_COLOUR, Stage
 
@@ -55,8 +56,8 @@ class Picture:
     """
 
     def __init__(self, film: Film, camera: Camera | None = None, top: float | None = None) -> None:
-        self.film = film
-        self.stage = Stage(film, camera or Camera(), STAGE[2:])
+        self.film, self.camera = film, camera or Camera()
+        self.stage = Stage(film, self.camera, STAGE[2:])
         self.norm = Normalize(0.0, 100 * (colour_top(film) if top is None else top))
         self.figure = Figure(figsize=SIZE, dpi=DPI, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
@@ -99,16 +100,16 @@ class Picture:
         bar.set_label("largest principal strain [%]", size=10)
         bar.ax.tick_params(labelsize=9)
         if self.stage.two_sided:
-            self._back(ax)
+            self._back(ax, 1.06 if above else 1.01)
         self._limits(ax)
 
-    def _back(self, ax: Axes) -> None:
-        """The colours of the back, in the left half of the scale."""
+    def _back(self, ax: Axes, above: float) -> None:
+        """The colours of the back, in the left half of the scale; names at the height `above`."""
         colours = greyer(colormaps[MAP](np.linspace(0, 1, 256))[:, None, :3])
         extent = (0.0, 0.5, 0.0, float(self.norm.vmax))  # type: ignore[arg-type]
         ax.imshow(colours, extent=extent, aspect="auto", origin="lower", zorder=1)
         for x, name, side in ((0.42, "back", "right"), (0.58, "front", "left")):
-            ax.text(x, -0.02, name, transform=ax.transAxes, ha=side, va="top", size=8, color=INK)
+            ax.text(x, above, name, transform=ax.transAxes, ha=side, size=8, color=INK)
 
     def _limits(self, ax: Axes) -> None:
         """The limits on the colour scale, with their names beside it."""
@@ -124,9 +125,10 @@ class Picture:
         else:
             values = "\nto ".join(f"{x:.3g}%" for x in limits)
             labels = {sum(limits) / len(limits): f"limit\n{values}"}
-        place = {"transform": ax.get_yaxis_transform(), "ha": "right", "va": "center"}
+        style: dict[str, Any] = {"size": 9, "linespacing": 1.1, "color": LIMIT_COLOUR}
+        style |= {"transform": ax.get_yaxis_transform(), "ha": "right", "va": "center"}
         for height, text in labels.items():
-            ax.text(-0.35, height, text, size=9, linespacing=1.1, color=LIMIT_COLOUR, **place)
+            ax.text(-0.35, height, text, **style)
 
     def _words(self) -> None:
         """Titles; those that change with the state are filled in by `draw`."""
@@ -145,7 +147,7 @@ class Picture:
         self.image.set_data(self.stage.draw(index, colours))
         clock = f"step {state.step}" if state.time is None else f"t = {state.time:.3f} s"
         self.line.set_text(f"{chart(self.film.solver)},  {clock}")
-        self.measured.set_text(measured(self.film.problem, state.positions))
+        self.measured.set_text(self.film.measured(index))
         for text in (self.heading, self.line, self.measured):
             self._fit(text)
         self.canvas.draw()

@@ -10,11 +10,11 @@ from strainbench.render.camera import Camera, Window
 from strainbench.render.export import surface
 from strainbench.render.film import Film
 from strainbench.render.obstacles import patches, pin_heads
-from strainbench.render.paint import Surface, paint
+from strainbench.render.paint import SAMPLES, Surface, paint
 
 OBSTACLE_COLOUR = np.full(3, 0.8)
 PIN_COLOUR = (0.13, 0.13, 0.14)
-PIN = 0.007  # radius of a pin's head, of the picture's width
+PIN, LEAST_PIN = 0.007, 2.8  # radius of a pin's head: of the picture's width, in pixels
 
 
 class Stage:
@@ -35,13 +35,14 @@ class Stage:
         self.obstacles = Surface(vertices, triangles, OBSTACLE_COLOUR)
         self.window = Window.around([camera.view(x) for x in [*everywhere, vertices]], size)
 
-    def draw(self, index: int, colours: FloatArray) -> NDArray[np.uint8]:
+    def draw(self, index: int, colours: FloatArray, samples: int = SAMPLES) -> NDArray[np.uint8]:
         """(height, width, 3) pixels of a state whose elements have `colours` (e, 3)."""
         x = self.film.states[index].positions
         body = Surface(x, self.faces, colours[self.owner], outlined=True, sides=self.two_sided)
-        heads = pin_heads(x[self.film.problem.pinned], PIN * self.window.width)
+        radius = max(PIN * self.window.size[0], LEAST_PIN) * self.window.pixel
+        heads = pin_heads(x[self.film.problem.pinned], radius)
         pins = Surface(*heads, np.array(PIN_COLOUR))
-        return paint([body, self.obstacles, pins], self.camera, self.window)
+        return paint([body, self.obstacles, pins], self.camera, self.window, samples)
 
 
 def facing(seen: FloatArray, faces: IntArray) -> IntArray:
