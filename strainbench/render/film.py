@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -54,6 +55,13 @@ class Film:
         """(e,) largest principal strain of each element, for each frame."""
         return [principal_stretches(self.problem, f.positions)[:, 0] - 1 for f in self.states]
 
+    def measured(self, index: int) -> str:
+        """What a state keeps and what it does not: limits, and obstacles where it is in one."""
+        x = self.states[index].positions
+        depth = penetration(self.obstacles, x)
+        inside = f"; vertices up to {1000 * depth:.2g} mm inside an obstacle" if depth > 0 else ""
+        return measured(self.problem, x) + inside
+
 
 def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
     """(e, dim) singular values of each deformation gradient, the largest first."""
@@ -63,15 +71,28 @@ def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
 
 def measured(problem: Problem, positions: FloatArray) -> str:
     """What was limited and how well, and how far the cloth is stretched in any direction."""
-    bounds, sampled = problem.kind.bounds, isinstance(problem.kind, Sampled)
-    ends = dict.fromkeys(f"{100 * (b - 1):.3g}%" for b in (bounds.min(), bounds.max()))
+    kind, bounds = problem.kind, problem.kind.bounds
+    limits = " to ".join(dict.fromkeys(f"{100 * (b - 1):.3g}%" for b in _ends(bounds)))
     excess = float(problem.violations(positions).max())
     kept = f"up to {100 * excess:.2g}% beyond" if excess >= KEPT else f"within {excess:.0e} of"
-    what = f"{len(problem.limits.directions)} sampled directions" if sampled else "limited stretch"
-    largest = float(principal_stretches(problem, positions).max()) - 1
-    between = sampled and len(ends) == 1 and largest > bounds.max() - 1 + excess
+    largest = float(principal_stretches(problem, positions).max())
+    sampled = isinstance(kind, Sampled)
+    between = sampled and np.ptp(bounds) == 0 and largest > bounds.max() + excess
     rest = "between them up to" if between else "largest strain"
-    return f"{what} {kept if excess else 'within'} {' to '.join(ends)}; {rest} {100 * largest:.3g}%"
+    count = len(kind.directions)
+    what = f"{count} sampled direction{'s' * (count > 1)}" if sampled else "principal stretch"
+    return f"{what} {kept if excess else 'within'} {limits}; {rest} {100 * (largest - 1):.2f}%"
+
+
+def _ends(values: FloatArray) -> tuple[float, float]:
+    """The least and the largest."""
+    return float(values.min()), float(values.max())
+
+
+def penetration(obstacles: Sequence[Obstacle], positions: FloatArray) -> float:
+    """How deep the deepest vertex lies inside an obstacle [m]; 0 if none does."""
+    depths = [-o.distances(positions)[0] for o in obstacles]
+    return float(np.max(depths, initial=0.0))
 
 
 def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:
