@@ -139,6 +139,8 @@ def test_of_tetrahedra_the_outer_faces_are_seen(tmp_path):
     assert [1, 2, 3] not in np.sort(faces).tolist()
     for face, element in zip(faces, owner, strict=True):
         assert set(face) <= set(problem.elements[element])
+    a, b, c = np.moveaxis(problem.rest[faces], 1, 0)
+    assert np.linalg.det(np.stack([a, b, c], axis=1)).sum() / 6 == pytest.approx(1 / 6 + 1 / 3)
     film = Film("two", "none", problem, [State(0, None, problem.target)], None)
     write_film(film, ["png", "ply", "vtu"], tmp_path)
     assert len(meshio.read(tmp_path / "frame-0000.ply").cells_dict["triangle"]) == 6
