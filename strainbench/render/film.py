@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -55,12 +54,10 @@ class Film:
         """(e,) largest principal strain of each element, for each frame."""
         return [principal_stretches(self.problem, f.positions)[:, 0] - 1 for f in self.states]
 
-    def measured(self, index: int) -> str:
-        """What a state keeps and what it does not: limits, and obstacles where it is in one."""
+    def inside(self, index: int) -> float:
+        """How deep the deepest vertex of a state lies inside an obstacle [m]; 0 if none does."""
         x = self.states[index].positions
-        depth = penetration(self.obstacles, x)
-        inside = f"; vertices up to {1000 * depth:.2g} mm inside an obstacle" if depth > 0 else ""
-        return measured(self.problem, x) + inside
+        return float(np.max([-o.distances(x)[0] for o in self.obstacles], initial=0.0))
 
 
 def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
@@ -74,7 +71,7 @@ def measured(problem: Problem, positions: FloatArray) -> str:
     kind, bounds = problem.kind, problem.kind.bounds
     limits = " to ".join(dict.fromkeys(f"{100 * (b - 1):.3g}%" for b in _ends(bounds)))
     excess = float(problem.violations(positions).max())
-    kept = f"up to {100 * excess:.2g}% beyond" if excess >= KEPT else f"within {excess:.0e} of"
+    kept = f"up to {100 * excess:.2f}% beyond" if excess >= KEPT else f"within {excess:.0e} of"
     largest = float(principal_stretches(problem, positions).max())
     sampled = isinstance(kind, Sampled)
     between = sampled and np.ptp(bounds) == 0 and largest > bounds.max() + excess
@@ -87,12 +84,6 @@ def measured(problem: Problem, positions: FloatArray) -> str:
 def _ends(values: FloatArray) -> tuple[float, float]:
     """The least and the largest."""
     return float(values.min()), float(values.max())
-
-
-def penetration(obstacles: Sequence[Obstacle], positions: FloatArray) -> float:
-    """How deep the deepest vertex lies inside an obstacle [m]; 0 if none does."""
-    depths = [-o.distances(positions)[0] for o in obstacles]
-    return float(np.max(depths, initial=0.0))
 
 
 def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:

@@ -14,7 +14,7 @@ from strainbench.render.raster import nearest
 
 SAMPLES = 2  # a pixel's side; 3 take twice as long
 LIGHT = np.array([-0.42, 0.56, 0.71])  # to the right, upwards, towards the viewer
-DARKEST = 0.5  # where no light falls
+DARKEST = 0.58  # where no light falls
 CREASE = np.cos(np.deg2rad(40.0))  # a surface that turns more at a vertex has an edge there
 LINE, LINE_DARK = 0.35, 0.3  # half the width of a triangle's outline [pixels], and how dark it is
 FINE = 9.0  # pixels: outlines of triangles that are smaller fade, as they would cover them

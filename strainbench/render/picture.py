@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from strainbench.escape import chart
 from strainbench.render.camera import Camera
-from strainbench.render.film import Film
+from strainbench.render.film import Film, measured
 from strainbench.render.paint import greyer
 from strainbench.render.stage import PIN_COLOUR, Stage
 
@@ -100,7 +100,7 @@ class Picture:
         bar.set_label("largest principal strain [%]", size=10)
         bar.ax.tick_params(labelsize=9)
         if self.stage.two_sided:
-            self._back(ax, 1.06 if above else 1.01)
+            self._back(ax, 1.06 if above else 1.025)
         self._limits(ax)
 
     def _back(self, ax: Axes, above: float) -> None:
@@ -146,8 +146,10 @@ class Picture:
         colours = colormaps[MAP](self.norm(100 * self.film.strains[index]))[:, :3]
         self.image.set_data(self.stage.draw(index, colours))
         clock = f"step {state.step}" if state.time is None else f"t = {state.time:.3f} s"
-        self.line.set_text(f"{chart(self.film.solver)},  {clock}")
-        self.measured.set_text(self.film.measured(index))
+        depth = 1000 * self.film.inside(index)
+        inside = f",  vertices up to {depth:.2g} mm inside an obstacle" if depth > 0 else ""
+        self.line.set_text(f"{chart(self.film.solver)},  {clock}{inside}")
+        self.measured.set_text(measured(self.film.problem, state.positions))
         for text in (self.heading, self.line, self.measured):
             self._fit(text)
         self.canvas.draw()
