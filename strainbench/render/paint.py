@@ -18,6 +18,7 @@ DARKEST = 0.58  # where no light falls
 CREASE = np.cos(np.deg2rad(40.0))  # a surface that turns more at a vertex has an edge there
 LINE, LINE_DARK = 0.35, 0.3  # half the width of a triangle's outline [pixels], and how dark it is
 FINE = 9.0  # pixels: outlines of triangles that are smaller fade, as they would cover them
+JUMP, CONTOUR_DARK = 6.0, 0.4  # a contour's least depth [pixels], and how dark it is
 BACK_GREY, BACK = 0.62, 0.5  # what is mixed into the colours of a surface's back, and how much
 
 
@@ -56,16 +57,26 @@ def paint(
     seen = camera.view(np.concatenate([s.vertices for s in surfaces]))
     points = window.pixels(seen)
     width, height = (samples * n for n in window.size)
-    face, weights = nearest(points * samples, faces, (width, height))
+    face, weights, depth = nearest(points * samples, faces, (width, height))
     hit = face >= 0
     face, weights = face[hit], weights[hit]
     normals, facing = corner_normals(seen, faces)
     shade = _light(normals, face, weights)
     shade *= 1 - _outlines(surfaces, points[faces], face, weights, samples)
+    shade *= 1 - CONTOUR_DARK * contours(depth, JUMP * samples)[hit]
     image = np.ones((height, width, 3))
     image[hit] = _colours(surfaces, facing)[face] * shade[:, None]
     blocks = image.reshape(height // samples, samples, width // samples, samples, 3)
     return np.asarray(np.round(255 * blocks.mean(axis=(1, 3))), dtype=np.uint8)
+
+
+def contours(depth: FloatArray, jump: float) -> NDArray[np.bool_]:
+    """(h, w) where a neighbour lies deeper by more than `jump`: the edges of folds."""
+    edge = np.zeros(depth.shape, dtype=bool)
+    for lines, marked in ((depth, edge), (depth.T, edge.T)):
+        marked[1:] |= lines[1:] - lines[:-1] > jump
+        marked[:-1] |= lines[:-1] - lines[1:] > jump
+    return edge
 
 
 def corner_normals(seen: FloatArray, faces: IntArray) -> tuple[FloatArray, NDArray[np.bool_]]:

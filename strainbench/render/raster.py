@@ -15,7 +15,7 @@ INSIDE = -1e-9  # of a triangle: rounding leaves no holes along shared edges
 
 def nearest(
     points: FloatArray, faces: IntArray, size: tuple[int, int]
-) -> tuple[IntArray, FloatArray]:
+) -> tuple[IntArray, FloatArray, FloatArray]:
     """The nearest triangle at each of `size` (width, height) pixels.
 
     Parameters
@@ -28,12 +28,13 @@ def nearest(
     -------
     face : (h, w) the triangle that the pixel's middle sees, -1 where there is none
     weights : (h, w, 3) the barycentric coordinates of the point that is seen
+    depth : (h, w) of that point, -1e300 where there is none
     """
     width, height = size
     face = np.full((height, width), -1, dtype=np.int64)
-    weights, depth = np.zeros((height, width, 3)), np.full((height, width), -np.inf)
+    weights, depth = np.zeros((height, width, 3)), np.full((height, width), -1e300)
     _fill(points, faces, face, weights, depth)
-    return face, weights
+    return face, weights, depth
 
 
 @compiled

@@ -20,7 +20,7 @@ from strainbench.render.picture import MAP, colour_top
 from strainbench.render.stage import Stage
 from strainbench.scenario.registry import list_scenarios
 
-SIZE, SAMPLES, COLOURS = (240, 180), 4, 128
+SIZE, SAMPLES, COLOURS = (240, 180), 4, 255
 FOLDER = Path("results/thumbnails")
 SOLVER = "newton-ipm"
 

@@ -11,7 +11,7 @@ from scenarios.collision import SPHERE, Collision
 from strainbench.render.camera import Camera, Window
 from strainbench.render.film import Film, State
 from strainbench.render.obstacles import patches
-from strainbench.render.paint import Surface, corner_normals, greyer, paint
+from strainbench.render.paint import Surface, contours, corner_normals, greyer, paint
 from strainbench.render.picture import STAGE, Picture
 from strainbench.render.raster import nearest
 from strainbench.render.stage import facing
@@ -83,11 +83,12 @@ def test_a_picture_has_cloth_before_the_ball_before_it():
 
 def test_each_pixel_sees_the_nearest_triangle_and_no_hole_between_neighbours(rng):
     grid = rng.uniform(0, 40, size=(60, 3, 3))
-    face, weights = nearest(grid.reshape(-1, 3), np.arange(180).reshape(-1, 3), (40, 40))
+    face, weights, depths = nearest(grid.reshape(-1, 3), np.arange(180).reshape(-1, 3), (40, 40))
     rows, columns = np.nonzero(face >= 0)
     seen = np.einsum("pk,pkc->pc", weights[rows, columns], grid[face[rows, columns]])
     np.testing.assert_allclose(seen[:, 0], columns + 0.5, atol=1e-6)
     np.testing.assert_allclose(seen[:, 1], rows + 0.5, atol=1e-6)
+    np.testing.assert_allclose(seen[:, 2], depths[rows, columns], atol=1e-6)
     for triangle in grid:  # no other one lies before it
         edges = np.column_stack([triangle[1] - triangle[0], triangle[2] - triangle[0]])
         b, c = np.linalg.solve(edges[:2], (seen - triangle[0])[:, :2].T)
@@ -143,19 +144,27 @@ def test_light_is_smooth_over_gentle_bends_and_breaks_at_creases():
     np.testing.assert_allclose(np.linalg.norm(gentle, axis=2), 1)
 
 
+def test_contours_lie_on_the_nearer_side_of_a_jump_in_depth():
+    depth = np.zeros((4, 5))
+    depth[1:3, 1:4] = 2.0
+    assert np.array_equal(contours(depth, 1.0), depth > 0)
+    assert not contours(depth, 3.0).any()
+
+
 def test_outlines_are_darker_than_the_triangles_and_fade_when_these_are_small():
-    camera = Camera(0, 0)
+    square = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    halves = np.array([[0, 1, 2], [0, 2, 3]])
     darkest = {}
     for size in ((90, 90), (4, 4)):
-        window = Window.around([TRIANGLE], size, margin=-0.2)  # edges within
+        window = Window.around([square], size, margin=-0.1)  # nothing but the diagonal
         plain, lined = (
-            paint([Surface(TRIANGLE, ONE, GREY, outlined=o)], camera, window).astype(float)
+            paint([Surface(square, halves, GREY, outlined=o)], Camera(0, 0), window).astype(float)
             for o in (False, True)
         )
         assert np.all(lined <= plain)
         darkest[size] = np.max((plain - lined) / plain)
-    assert darkest[90, 90] > 0.08  # half a line, of one triangle
-    assert darkest[4, 4] < darkest[90, 90]
+    assert 0.1 < darkest[90, 90] < 0.3
+    assert 0 < darkest[4, 4] < darkest[90, 90]
 
 
 def test_a_window_holds_its_points_with_square_pixels_upright():
