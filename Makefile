@@ -15,7 +15,7 @@ TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipo
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test quick check coverage docs graph perf report clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick check coverage docs graph perf report thumbnails clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -83,6 +83,9 @@ perf: setup ## pytest-benchmark on recorded frames; writes results/local/perf.js
 
 report: setup ## tables and charts from results/local/bench again
 	$(BIN)/strainbench report --results $(BENCH)
+
+thumbnails: setup ## a small picture of each scene, into results/thumbnails; a minute or two
+	$(BIN)/python -m strainbench.render.thumbnails
 
 clean: ## remove the virtual environment and caches, keep every result
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .benchmarks .import_linter_cache

@@ -14,6 +14,7 @@ from strainbench.bench.plan import plan_one
 from strainbench.bench.records import open_folder
 from strainbench.options import shown
 from strainbench.render.animation import write_gif, write_mp4
+from strainbench.render.camera import Camera
 from strainbench.render.export import MESH_FORMATS, write_meshes
 from strainbench.render.film import (
     Film,
@@ -21,7 +22,7 @@ from strainbench.render.film import (
     shoot,
     untracked,
 )
-from strainbench.render.picture import DPI, Camera, Picture
+from strainbench.render.picture import DPI, Picture
 
 FORMATS = ("png", "gif", "mp4", *MESH_FORMATS)
 

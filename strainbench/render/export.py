@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
-from itertools import combinations
 from pathlib import Path
 
 import meshio
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.problem.elements import rest_corners
 from strainbench.problem.problem import Problem
 from strainbench.render.film import Film, State, Track, principal_stretches, untracked
 
 MESH_FORMATS = ("obj", "ply", "vtu")
+OUTWARDS = ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+"""Corners of each face of a tetrahedron of positive volume, anticlockwise from without."""
 
 
 def surface(problem: Problem) -> tuple[IntArray, IntArray]:
     """What can be seen of a mesh: all triangles, or the outer faces of tetrahedra.
+
+    These are anticlockwise from without.
 
     Returns
     -------
@@ -28,8 +32,11 @@ def surface(problem: Problem) -> tuple[IntArray, IntArray]:
     elements = problem.elements
     if elements.shape[1] == 3:
         return elements, np.arange(len(elements))
-    faces = np.concatenate([elements[:, list(c)] for c in combinations(range(4), 3)])
+    faces = np.concatenate([elements[:, list(c)] for c in OUTWARDS])
     owner = np.tile(np.arange(len(elements)), 4)
+    corners = rest_corners(problem.rest, elements)
+    mirrored = np.linalg.det(corners[:, 1:] - corners[:, :1]) < 0
+    faces = np.where(mirrored[owner][:, None], faces[:, ::-1], faces)
     _, first, count = np.unique(np.sort(faces), axis=0, return_index=True, return_counts=True)
     outer = np.sort(first[count == 1])
     return faces[outer], owner[outer]

@@ -10,11 +10,14 @@ import numpy as np
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.physics.energies.contact import Obstacle
+from strainbench.problem.kinds import Sampled
 from strainbench.problem.problem import Problem
 from strainbench.progress import Track as Track
 from strainbench.progress import untracked as untracked
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.stage import Stage, StageError, Who
+
+KEPT = 1e-4  # strain beyond a limit that is told as a power of ten
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,11 +54,36 @@ class Film:
         """(e,) largest principal strain of each element, for each frame."""
         return [principal_stretches(self.problem, f.positions)[:, 0] - 1 for f in self.states]
 
+    def inside(self, index: int) -> float:
+        """How deep the deepest vertex of a state lies inside an obstacle [m]; 0 if none does."""
+        x = self.states[index].positions
+        return float(np.max([-o.distances(x)[0] for o in self.obstacles], initial=0.0))
+
 
 def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
     """(e, dim) singular values of each deformation gradient, the largest first."""
     F = problem.deformation_gradients(positions)
     return np.asarray(np.linalg.svd(F, compute_uv=False), dtype=np.float64)
+
+
+def measured(problem: Problem, positions: FloatArray) -> str:
+    """What was limited and how well, and how far the cloth is stretched in any direction."""
+    kind, bounds = problem.kind, problem.kind.bounds
+    limits = " to ".join(dict.fromkeys(f"{100 * (b - 1):.3g}%" for b in _ends(bounds)))
+    excess = float(problem.violations(positions).max())
+    kept = f"up to {100 * excess:.2f}% beyond" if excess >= KEPT else f"within {excess:.0e} of"
+    largest = float(principal_stretches(problem, positions).max())
+    sampled = isinstance(kind, Sampled)
+    between = sampled and np.ptp(bounds) == 0 and largest > bounds.max() + excess
+    rest = "between them up to" if between else "largest strain"
+    count = len(kind.directions)
+    what = f"{count} sampled direction{'s' * (count > 1)}" if sampled else "principal stretch"
+    return f"{what} {kept if excess else 'within'} {limits}; {rest} {100 * (largest - 1):.2f}%"
+
+
+def _ends(values: FloatArray) -> tuple[float, float]:
+    """The least and the largest."""
+    return float(values.min()), float(values.max())
 
 
 def shoot(cell: Cell, every: int = 1, track: Track = untracked) -> Film:

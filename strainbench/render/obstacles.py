@@ -9,8 +9,8 @@ import numpy as np
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.energies.contact import Floor, Obstacle, Sphere
 
-TURNS = 48  # meridians of a sphere: facets that the eye does not see at our size
-TILES = 12  # of a floor, along each side
+TURNS = 96  # meridians of a sphere: within 0.05% of its radius
+PIN_TURNS = 16
 BEYOND = 0.15  # of the cloth's extent, by which a floor goes further than it
 
 
@@ -21,33 +21,39 @@ def patches(obstacles: Sequence[Obstacle], cloth: FloatArray) -> tuple[FloatArra
     ----------
     cloth : (n, 3) positions over all states [m]: a floor reaches a little beyond them
     """
+    grids = [ball(np.array(o.centre), o.radius) for o in obstacles if isinstance(o, Sphere)]
+    grids += [_tile(o, cloth) for o in obstacles if isinstance(o, Floor)]
+    return together(grids)
+
+
+def pin_heads(pins: FloatArray, radius: float) -> tuple[FloatArray, IntArray]:
+    """Small balls at pinned points (p, 3), as vertices and triangles."""
+    return together([ball(pin, radius, PIN_TURNS) for pin in pins])
+
+
+def together(grids: Sequence[FloatArray]) -> tuple[FloatArray, IntArray]:
+    """Vertices (v, 3) and triangles (t, 3) of grids of points (r, c, 3)."""
     vertices, faces = np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
-    for obstacle in obstacles:
-        if isinstance(obstacle, Sphere):
-            points = _ball(obstacle)
-        elif isinstance(obstacle, Floor):
-            points = _tiles(obstacle, cloth)
-        else:
-            continue
+    for points in grids:
         faces = np.concatenate([faces, _triangles(points) + len(vertices)])
         vertices = np.concatenate([vertices, points.reshape(-1, 3)])
     return vertices, faces
 
 
-def _ball(sphere: Sphere) -> FloatArray:
+def ball(centre: FloatArray, radius: float, turns: int = TURNS) -> FloatArray:
     """(r, c, 3) points along meridians and parallels."""
-    theta = np.linspace(0, np.pi, TURNS // 2 + 1)[:, None]
-    phi = np.linspace(0, 2 * np.pi, TURNS + 1)
+    theta = np.linspace(0, np.pi, turns // 2 + 1)[:, None]
+    phi = np.linspace(0, 2 * np.pi, turns + 1)
     height = np.broadcast_to(np.cos(theta), (len(theta), len(phi)))
     unit = np.stack([np.sin(theta) * np.sin(phi), height, np.sin(theta) * np.cos(phi)], axis=-1)
-    return np.array(sphere.centre) + sphere.radius * unit
+    return centre + radius * unit
 
 
-def _tiles(floor: Floor, cloth: FloatArray) -> FloatArray:
-    """(r, c, 3) points of a rectangle below the cloth."""
+def _tile(floor: Floor, cloth: FloatArray) -> FloatArray:
+    """(2, 2, 3) corners of a rectangle below the cloth."""
     low, high = cloth[:, [0, 2]].min(axis=0), cloth[:, [0, 2]].max(axis=0)
     beyond = BEYOND * (high - low).max()
-    x, z = np.linspace(low - beyond, high + beyond, TILES + 1).T
+    x, z = np.stack([low - beyond, high + beyond], axis=1)
     grid = np.meshgrid(z, x)
     return np.stack([grid[1], np.full_like(grid[0], floor.height), grid[0]], axis=-1)
 

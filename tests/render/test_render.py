@@ -17,7 +17,7 @@ from strainbench.bench.plan import plan_one
 from strainbench.render import FORMATS, Camera, Film, Picture, render, write_film
 from strainbench.render.animation import durations
 from strainbench.render.export import surface
-from strainbench.render.film import State, principal_stretches, shoot
+from strainbench.render.film import State, measured, principal_stretches, shoot
 from strainbench.render.picture import DPI, SIZE, nice_above
 from strainbench.render.polar import admissible, directional_stretches, draw_polar, polar
 from tests.cli.test_cli import strainbench
@@ -139,6 +139,8 @@ def test_of_tetrahedra_the_outer_faces_are_seen(tmp_path):
     assert [1, 2, 3] not in np.sort(faces).tolist()
     for face, element in zip(faces, owner, strict=True):
         assert set(face) <= set(problem.elements[element])
+    a, b, c = np.moveaxis(problem.rest[faces], 1, 0)
+    assert np.linalg.det(np.stack([a, b, c], axis=1)).sum() / 6 == pytest.approx(1 / 6 + 1 / 3)
     film = Film("two", "none", problem, [State(0, None, problem.target)], None)
     write_film(film, ["png", "ply", "vtu"], tmp_path)
     assert len(meshio.read(tmp_path / "frame-0000.ply").cells_dict["triangle"]) == 6
@@ -238,6 +240,34 @@ def test_the_camera_sees_lengths_in_its_plane_as_they_are(rng):
     assert axes @ axes.T == pytest.approx(np.eye(3))
     assert np.linalg.det(axes) == pytest.approx(1)
     assert Camera(0, 0).view(np.array([[1.0, 2.0, 3.0]])) == pytest.approx(np.array([[1, 2, 3]]))
+
+
+def test_a_picture_says_what_is_kept_and_how_far_the_cloth_goes_between():
+    rest = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+
+    def said(stretches, limits):
+        positions = np.column_stack([rest * stretches, np.zeros(3)])
+        return measured(Problem(rest, np.array([[0, 1, 2]]), positions, limits), positions)
+
+    one = StretchLimits.sampled([0.0], [1.01])
+    assert said((1.01 + 1e-7, 1.023), one).startswith("1 sampled direction within 1e-07 of 1%")
+    assert said((1.01 + 1e-7, 1.023), one).endswith("; between them up to 2.30%")
+    assert said((1.0, 1.005), one) == "1 sampled direction within 1%; largest strain 0.50%"
+    assert said((1.03, 1.0), one).startswith("1 sampled direction up to 2.00% beyond 1%")
+    exact = StretchLimits.exact(1.01)
+    assert said((1.01, 1.0), exact) == "principal stretch within 1%; largest strain 1.00%"
+    curve = StretchLimits.sampled([0.0, np.pi / 2], [1.01, 1.3])
+    assert said((1.0, 1.2), curve) == "2 sampled directions within 1% to 30%; largest strain 20.00%"
+
+
+def test_a_picture_says_how_deep_the_cloth_is_in_an_obstacle(film):
+    from strainbench.physics.energies.contact import Floor
+
+    for heights, said in (((-9.0,), ""), ((0.0025, -9.0), "vertices up to 2.5 mm inside")):
+        picture = Picture(replace(film, obstacles=tuple(Floor(h) for h in heights)))
+        picture.draw(0)
+        assert said in picture.line.get_text()
+        assert ("inside" in picture.line.get_text()) == bool(said)
 
 
 @pytest.mark.parametrize(
