@@ -102,7 +102,7 @@ def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
     if run["outcome"] == NO_ANSWER:
         if Ending.of(run["reason"]) is Ending.TIME_LIMIT:
             return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
-        return Finish(NO_ANSWER, done, asked, _cause(run["reason"]))
+        return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
     if run["outcome"] in COUNT:
         return Finish(run["outcome"], done, asked)
     failed = steps[~steps["outcome"].isin(COUNT)]
@@ -112,7 +112,7 @@ def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
     return Finish(VIOLATED, done, asked, f"violates by {power(run['max_violation'])}")
 
 
-def _cause(reason: str) -> str:
+def cause(reason: str) -> str:
     """Why there is no answer, in at most four words."""
     known = {Ending.UNAVAILABLE: "not installed", Ending.UNSUPPORTED: "refuses the problem"}
     ending = Ending.of(reason)
