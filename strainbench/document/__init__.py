@@ -8,7 +8,7 @@ Texts are given as they are, whatever they hold: the writers escape them, each i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 

@@ -25,20 +25,17 @@ def latex(tables: Iterable[Table]) -> str:
 
 def width(table: Table) -> float:
     """About how many points a table takes across."""
-    shown = [list(column) for column in zip(*([_bare(t) for t in r] for r in table.texts()), strict=True)]
-    letters = [max(map(_letters, texts), default=0) for texts in shown]
+    letters = [max(map(_letters, texts)) for texts in zip(*table.texts(), strict=True)]
     for k, names in _headings(table.columns):
         room = sum(letters[k : k + len(names)])
         letters[k] += max(0, len(names[0].heading) - room)
     return sum(LETTER * count + GAP for count in letters)
 
 
-def _bare(text: str) -> str:
-    return "" if isinstance(text, Span | Faint) else text
-
-
 def _letters(text: str) -> float:
     """How wide a text is, in letters."""
+    if isinstance(text, Span | Faint):
+        return 0
     if isinstance(text, Between):
         return 0.8 * max(len(text.low), len(text.high))
     return len(text) + 2.5 * ("e-" in text)
@@ -85,7 +82,7 @@ def _side(column: Column, texts: Sequence[str]) -> str:
         return QUARTILES
     if not column.right:
         return "l"
-    found = [match for text in texts if (match := NUMBER.fullmatch(_bare(text)))]
+    found = [match for text in texts if (match := NUMBER.fullmatch(text))]
     below, whole, places, power = ([len(m[k] or "") for m in found] for k in (1, 2, 3, 4))
     form = f"{'<' * max(below, default=0)}{max(whole, default=1)}.{max(places, default=0)}"
     exponent = f"e-{'1' * (max(power) - 2)}" if any(power) else ""

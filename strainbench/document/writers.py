@@ -68,7 +68,8 @@ def csv(table: Table) -> str:
     """One line a line, numbers with all their digits."""
     buffer = io.StringIO()
     writer = csv_.writer(buffer, lineterminator="\n")
-    writer.writerows(map(escape.cell, line) for line in (table.headings, *table.cells))
+    writer.writerow(map(escape.cell, table.headings))
+    writer.writerows(map(escape.cell, line) for line in table.cells)
     return buffer.getvalue()
 
 

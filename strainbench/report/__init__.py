@@ -14,14 +14,18 @@ from strainbench.document.writers import csv, markdown
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_table
 from strainbench.report.failures import failures, failures_document
+from strainbench.report.measures import measured
 from strainbench.report.names import with_names
+from strainbench.report.steps import newest_steps
 from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_tables
-from strainbench.report.table import as_document, as_latex, as_markdown, tidy
+from strainbench.report.table import as_document, as_markdown, tidy
 from strainbench.report.versions import shown_runs
 
 
 def load_runs(folder: Path) -> pd.DataFrame:
-    """The row of each cell that is shown, numbers as numbers; see `strainbench.report.versions`.
+    """The row of each cell that is shown, numbers as numbers, with what it comes to.
+
+    See `strainbench.report.versions`, `names` and `measures`.
 
     Raises
     ------
@@ -34,7 +38,8 @@ def load_runs(folder: Path) -> pd.DataFrame:
     runs = pd.DataFrame(rows)
     for column in runs.columns.difference([*WORDS, "older"]):
         runs[column] = pd.to_numeric(runs[column])
-    return with_names(runs)
+    named = with_names(runs)
+    return measured(named, newest_steps(folder, named))
 
 
 def write_report(folder: Path) -> list[Path]:
@@ -47,7 +52,6 @@ def write_report(folder: Path) -> list[Path]:
     texts = {
         "table1.csv": csv(Table.of(tidy(runs))),
         "table1.md": as_markdown(runs, machines),
-        "table1.tex": as_latex(runs),
         "index.html": page(as_document(runs, machines, "strainbench results", drawings)),
     }
     if swept := sweep_tables(runs):
