@@ -5,17 +5,25 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
+from typing import NamedTuple
 
 from strainbench import escape
 from strainbench.document import Between, Column, Faint, Prose, Span, Strong, Table
 
 COLUMN, PAGE = 238.0, 505.0
 """Points across a column of a two-column article of the narrow kind, and across both."""
-LETTER, GAP = 4.4, 6.0
-"""Points across a letter in \\footnotesize, and between columns."""
+SIZES = {r"\footnotesize": 1.0, r"\scriptsize": 0.94}
+"""Sizes of type that a table may have, and how wide they are."""
+LETTER, DIGIT, SMALL_DIGIT, GAP = 3.8, 4.4, 3.5, 4.5
+"""Points across letters in \\footnotesize of Computer Modern, a wide type, and between columns."""
 NUMBER = re.compile(r"(<?)-?(\d+)(?:\.(\d+))?(e-?\d+)?")
 POWER = re.compile(r"(?<![\w.+-])\d(?:\.\d+)?e-?\d+(?![\w-])")
-QUARTILES = r"@{\,}l"
+SETUP = (
+    r"\setlength{\tabcolsep}{2pt}\sisetup{exponent-product=\cdot,tight-spacing=true}%",
+    r"\newcommand{\quartiles}[2]{$\vcenter{\offinterlineskip"
+    r"\hbox{\tiny #1}\kern0.6pt\hbox{\tiny #2}}$}%",
+    r"\renewcommand{\arraystretch}{1.08}%",
+)
 
 
 def latex(tables: Iterable[Table]) -> str:
@@ -24,25 +32,44 @@ def latex(tables: Iterable[Table]) -> str:
 
 
 def width(table: Table) -> float:
-    """About how many points a table takes across."""
-    letters = [max(map(_letters, texts)) for texts in zip(*table.texts(), strict=True)]
+    """About how many points a table takes across in \\footnotesize."""
+    points = [
+        max(_Form.of(texts).points, *map(_points, texts))
+        for texts in zip(*table.texts(), strict=True)
+    ]
     for k, names in _headings(table.columns):
-        room = sum(letters[k : k + len(names)])
-        letters[k] += max(0, len(names[0].heading) - room)
-    return sum(LETTER * count + GAP for count in letters)
+        _widen(points, k, len(names), LETTER * len(names[0].heading))
+    for line in table.texts():
+        for k, text in enumerate(line):
+            if isinstance(text, Span) and text.width < len(points):
+                _widen(points, k, text.width, LETTER * len(text))
+    return sum(points) + GAP * (len(points) - 1)
 
 
-def _letters(text: str) -> float:
-    """How wide a text is, in letters."""
+def _widen(points: list[float], first: int, count: int, needed: float) -> None:
+    """Make columns as wide as what spans them."""
+    there = sum(points[first : first + count]) + GAP * (count - 1)
+    points[first + count - 1] += max(0.0, needed - there)
+
+
+def _points(text: str) -> float:
+    """How wide a text is, if it neither spans columns nor is a number."""
     if isinstance(text, Span | Faint):
-        return 0
+        return 0.0
+    if NUMBER.fullmatch(text):
+        return 0.0
     if isinstance(text, Between):
-        return 0.8 * max(len(text.low), len(text.high))
-    return len(text) + 2.5 * ("e-" in text)
+        return SMALL_DIGIT * max(len(text.low), len(text.high))
+    return LETTER * len(text)
 
 
 def _float(table: Table) -> str:
-    kind = "table*" if width(table) > COLUMN else "table"
+    across = width(table)
+    fits = (
+        (room, size) for room in (COLUMN, PAGE) for size in SIZES if across * SIZES[size] <= room
+    )
+    room, size = next(fits, (PAGE, list(SIZES)[-1]))
+    kind = "table" if room == COLUMN else "table*"
     above = [f"% {escape.plain(text)}" for text in (table.command,) if text]
     label = [rf"\label{{tab:{table.label}}}"] if table.label else []
     notes = " ".join(map(_words, table.notes))
@@ -51,10 +78,10 @@ def _float(table: Table) -> str:
         [
             *above,
             rf"\begin{{{kind}}}",
-            r"\centering",
-            rf"\caption{{{_words(table.title)}}}",
+            rf"\centering\caption{{{_words(table.title)}}}",
             *label,
-            r"\footnotesize\setlength{\tabcolsep}{3pt}",
+            rf"\medskip{size}",
+            *SETUP,
             *_tabular(table),
             *below,
             rf"\end{{{kind}}}",
@@ -79,14 +106,33 @@ def _tabular(table: Table) -> Iterator[str]:
 def _side(column: Column, texts: Sequence[str]) -> str:
     """How the cells of a column are aligned: numbers by their points."""
     if any(isinstance(text, Between) for text in texts):
-        return QUARTILES
-    if not column.right:
-        return "l"
-    found = [match for text in texts if (match := NUMBER.fullmatch(text))]
-    below, whole, places, power = ([len(m[k] or "") for m in found] for k in (1, 2, 3, 4))
-    form = f"{'<' * max(below, default=0)}{max(whole, default=1)}.{max(places, default=0)}"
-    exponent = f"e-{'1' * (max(power) - 2)}" if any(power) else ""
-    return f"S[table-format={form}{exponent},mode=text,detect-weight]"
+        return r"@{\,}l"
+    return f"S[table-format={_Form.of(texts)},detect-weight]" if column.right else "l"
+
+
+class _Form(NamedTuple):
+    """What the numbers of a column have at most: letters in each part of a number."""
+
+    below: int
+    whole: int
+    places: int
+    power: int
+
+    @classmethod
+    def of(cls, texts: Iterable[str]) -> _Form:
+        found = [match for text in texts if (match := NUMBER.fullmatch(text))]
+        most = (max((len(m[k] or "") for m in found), default=0) for k in (1, 2, 3, 4))
+        return cls(*most)
+
+    def __str__(self) -> str:
+        exponent = f"e-{'1' * (self.power - 2)}" if self.power else ""
+        return f"{'<' * self.below}{self.whole}.{self.places}{exponent}"
+
+    @property
+    def points(self) -> float:
+        """How wide."""
+        digits = self.whole + self.places + 0.6 * (self.places > 0)
+        return DIGIT * digits + 9 * self.below + 17 * (self.power > 0)
 
 
 def _above(columns: Sequence[Column]) -> Iterator[str]:
@@ -140,7 +186,7 @@ def _cell(column: Column, text: str) -> str:
         case Faint():
             return ""
         case Between():
-            return f"${{}}^{{{text.high}}}_{{{text.low}}}$" if text else ""
+            return rf"\quartiles{{{text.high}}}{{{text.low}}}" if text else ""
     if column.right and NUMBER.fullmatch(text):
         return rf"\bfseries {text}" if isinstance(text, Strong) else str(text)
     words = rf"\textbf{{{_words(text)}}}" if isinstance(text, Strong) else _words(text)

@@ -16,6 +16,7 @@ from strainbench.report.energy import draw_energy, energy_table
 from strainbench.report.failures import failures, failures_document
 from strainbench.report.measures import measured
 from strainbench.report.names import with_names
+from strainbench.report.paper import as_latex, chosen_methods
 from strainbench.report.steps import newest_steps
 from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_tables
 from strainbench.report.table import as_document, as_markdown, tidy
@@ -52,6 +53,7 @@ def write_report(folder: Path) -> list[Path]:
     texts = {
         "table1.csv": csv(Table.of(tidy(runs))),
         "table1.md": as_markdown(runs, machines),
+        "table1.tex": as_latex(chosen_methods(runs, None)),
         "index.html": page(as_document(runs, machines, "strainbench results", drawings)),
     }
     if swept := sweep_tables(runs):

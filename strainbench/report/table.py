@@ -69,13 +69,15 @@ class Group:
         """The looser the later."""
         return list(self.runs.sort_values(["limit", "bound"])["bound"].unique())
 
+    def by_limit(self) -> Iterator[tuple[str, pd.DataFrame]]:
+        """The cells of each limit."""
+        yield from ((limit, self.runs[self.runs["bound"] == limit]) for limit in self.limits)
+
     def blocks(self) -> Iterator[pd.DataFrame]:
         """The cells of each limit and mesh, by outcome, then by time; implicit Euler left out."""
-        constrained = self.runs[self.runs["solver"] != UNCONSTRAINED]
-        for limit in self.limits:
-            for mesh in self.meshes:
-                here = (constrained["bound"] == limit) & (constrained["mesh"] == mesh)
-                yield ranked(constrained[here])
+        for _, rows in self.by_limit():
+            constrained = rows[rows["solver"] != UNCONSTRAINED]
+            yield from (ranked(constrained[constrained["mesh"] == mesh]) for mesh in self.meshes)
 
     def implicit_euler(self) -> dict[str, float]:
         """Mean seconds a step of unconstrained implicit Euler on each mesh on which it ran to its
