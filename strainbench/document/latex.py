@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from strainbench import escape
-from strainbench.document import Between, Column, Faint, Prose, Span, Strong, Table
+from strainbench.document import Between, Column, Faint, Picture, Prose, Span, Strong, Table
 
 COLUMN, PAGE = 238.0, 505.0
 """Points across a column of a two-column article of the narrow kind, and across both."""
@@ -21,14 +21,31 @@ POWER = re.compile(r"(?<![\w.+-])\d(?:\.\d+)?e-?\d+(?![\w-])")
 SETUP = (
     r"\setlength{\tabcolsep}{2pt}\sisetup{exponent-product=\cdot,tight-spacing=true}%",
     r"\newcommand{\quartiles}[2]{$\vcenter{\offinterlineskip"
-    r"\hbox{\tiny #1}\kern0.6pt\hbox{\tiny #2}}$}%",
+    r"\hbox{\tiny #1}\kern0.9pt\hbox{\tiny #2}}$}%",
     r"\renewcommand{\arraystretch}{1.08}%",
 )
 
 
-def latex(tables: Iterable[Table]) -> str:
-    """Floats with caption, label and notes, over both columns of an article where one is narrow."""
-    return "\n\n".join(map(_float, tables)) + "\n"
+def latex(parts: Iterable[Table | Picture]) -> str:
+    """Floats with captions: tables, over both columns where one is narrow, and figures."""
+    floats = [_figure(p) if isinstance(p, Picture) else _float(p) for p in parts if _shown(p)]
+    return "\n\n".join(floats) + "\n"
+
+
+def _shown(part: Table | Picture) -> bool:
+    return isinstance(part, Picture) or bool(part.lines)
+
+
+def _figure(picture: Picture) -> str:
+    return "\n".join(
+        [
+            r"\begin{figure}",
+            rf"\centering\includegraphics[width=\linewidth]{{{picture.path.as_posix()}}}",
+            rf"\caption{{{_words(picture.about)}}}",
+            rf"\label{{fig:{picture.path.stem}}}",
+            r"\end{figure}",
+        ]
+    )
 
 
 def width(table: Table) -> float:

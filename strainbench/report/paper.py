@@ -96,14 +96,16 @@ def paper_tables(runs: pd.DataFrame, columns: Sequence[str] = USUAL) -> list[Tab
     return [table for sheet in sheets for table in sheet.tables(sheet.meshes)]
 
 
-def chosen_columns(text: str) -> list[str]:
-    """The names of quantities, with commas between.
+def chosen_columns(text: str | None) -> Sequence[str]:
+    """The names of quantities, with commas between; the usual ones if not given.
 
     Raises
     ------
     ValueError
         For a name that is none, or none at all.
     """
+    if text is None:
+        return USUAL
     names = [name.strip() for name in text.split(",")]
     for name in names:
         if name not in QUANTITIES:
