@@ -19,7 +19,8 @@ LETTER, DIGIT, SMALL_DIGIT, GAP = 3.8, 4.4, 3.5, 4.5
 NUMBER = re.compile(r"(<?)-?(\d+)(?:\.(\d+))?(e-?\d+)?")
 POWER = re.compile(r"(?<![\w.+-])\d(?:\.\d+)?e-?\d+(?![\w-])")
 SETUP = (
-    r"\setlength{\tabcolsep}{2pt}\sisetup{exponent-product=\cdot,tight-spacing=true}%",
+    r"\setlength{\tabcolsep}{2pt}\sisetup{exponent-product=\cdot,tight-spacing=true,"
+    r"group-minimum-digits=12}%",
     r"\newcommand{\quartiles}[2]{$\vcenter{\offinterlineskip"
     r"\hbox{\tiny #1}\kern0.9pt\hbox{\tiny #2}}$}%",
     r"\renewcommand{\arraystretch}{1.08}%",
@@ -142,14 +143,14 @@ class _Form(NamedTuple):
         return cls(*most)
 
     def __str__(self) -> str:
-        exponent = f"e-{'1' * (self.power - 2)}" if self.power else ""
-        return f"{'<' * self.below}{self.whole}.{self.places}{exponent}"
+        exponent = f"e-{self.power - 2}" if self.power else ""
+        return f"{'<' * self.below}{max(self.whole, 1)}.{self.places}{exponent}"
 
     @property
     def points(self) -> float:
         """How wide."""
         digits = self.whole + self.places + 0.6 * (self.places > 0)
-        return DIGIT * digits + 9 * self.below + 17 * (self.power > 0)
+        return DIGIT * digits + 9 * self.below + (self.power > 0) * (7 + DIGIT * self.power)
 
 
 def _above(columns: Sequence[Column]) -> Iterator[str]:

@@ -50,10 +50,14 @@ def marked(cells: pd.DataFrame) -> Iterator[tuple[pd.Series, list[str]]]:
 
 def measures_of(row: pd.Series) -> list[str]:
     """The entries of MEASURES; numbers that do not count are faint."""
-    low, high = (milliseconds(row[name]) for name in ("time_low", "time_high"))
-    texts = [milliseconds(row["time"]), Between.of(low, high)]
-    texts += [milliseconds(row["solve_seconds_mean"]), *accuracy_of(row)]
+    texts = [*time_of(row), milliseconds(row["solve_seconds_mean"]), *accuracy_of(row)]
     return [ending_text(row), *(texts if row["ending"] in COUNT else map(Faint, texts))]
+
+
+def time_of(row: pd.Series) -> tuple[str, str]:
+    """Median and quartiles in ms; no quartiles of one projection."""
+    low, high = (milliseconds(row[name]) for name in ("time_low", "time_high"))
+    return milliseconds(row["time"]), Between.of(low, high) if row["time_count"] > 1 else ""
 
 
 def accuracy_of(row: pd.Series) -> tuple[str, str, str]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from strainbench.document import Between, Column, Prose, Span, Strong, Table
+from strainbench.document import Column, Prose, Span, Strong, Table
 from strainbench.document.latex import PAGE, latex, width
-from strainbench.report.lines import accuracy_of, milliseconds, ranked
+from strainbench.report.lines import accuracy_of, milliseconds, ranked, time_of
 from strainbench.report.measures import COUNT, FEASIBLE, OPTIMAL, OUT_OF_TIME, VIOLATED
 from strainbench.report.names import cells
 from strainbench.report.numbers import power
@@ -31,15 +31,10 @@ def _right(name: str, unit: str = "") -> Column:
     return Column(name, unit, right=True)
 
 
-def _time(row: pd.Series) -> list[str]:
-    low, high = (milliseconds(row[name]) for name in ("time_low", "time_high"))
-    return [milliseconds(row["time"]), Between.of(low, high)]
-
-
 QUANTITIES = {
     "seconds": Quantity(
         [_right("time", "ms"), Column("")],
-        _time,
+        time_of,
         "time a projection",
         "Time: median over projections with active constraints, with quartiles.",
     ),
