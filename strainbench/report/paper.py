@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from strainbench.document import Column, Prose, Span, Strong, Table
+from strainbench.document import Between, Column, Prose, Span, Strong, Table
 from strainbench.document.latex import PAGE, latex, width
 from strainbench.report.lines import accuracy_of, milliseconds, ranked, time_of
 from strainbench.report.measures import COUNT, FEASIBLE, OPTIMAL, OUT_OF_TIME, VIOLATED
-from strainbench.report.names import cells
+from strainbench.report.names import HOW, cells
 from strainbench.report.numbers import power
 from strainbench.report.table import UNCONSTRAINED, Group, groups
 
@@ -36,7 +36,7 @@ QUANTITIES = {
         [_right("time", "ms"), Column("")],
         time_of,
         "time a projection",
-        "Time: median over projections with active constraints, with quartiles.",
+        "Time: median over projections with active constraints.",
     ),
     "mean": Quantity(
         [_right("mean", "ms")],
@@ -202,7 +202,7 @@ class Sheet:
             f"{_few(count)} {replayed}{_step(first)}{'s' if count > 1 else ''}",
             f"{_few(threads)} thread{'s' if threads > 1 else ''}",
             *(f"{limit:g} s a cell" for limit in self.runs["time_limit"].dropna().unique()),
-            first["apart"],
+            first["apart"].removesuffix(HOW["steps_asked"].format(count)).removesuffix(", "),
         ]
         return f"{what.capitalize()}: {', '.join(filter(None, about))}."
 
@@ -212,6 +212,7 @@ class Sheet:
         first = here.iloc[0]
         violation, gap = (power(first[f"{name}_threshold"]) for name in ("violation", "gap"))
         marks = {
+            "Small: third quartile over first.": any(isinstance(t, Between) for t in texts),
             "<: below the error of the reference.": any(t.startswith("<") for t in texts),
             f"Optimal: violation at most {violation}, relative gap at most {gap} on every step.": (
                 OPTIMAL in set(here["ending"])
