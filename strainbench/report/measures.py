@@ -26,6 +26,7 @@ COUNT = (OPTIMAL, FEASIBLE)
 SIGNS = {OPTIMAL: "✓", FEASIBLE: "○", VIOLATED: "✗", OUT_OF_TIME: "✗", NO_ANSWER: "✗"}
 CLOCK = ("time limit", "time_limit", "user_limit", "time out", "timeout", "max_time")
 """What solvers say, in lower case, where the clock ended a projection."""
+STEPS = ("steps_asked", "steps_done")
 NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
 
@@ -98,7 +99,7 @@ def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
     ----------
     steps : of this cell
     """
-    asked, done = int(run["steps_asked"]), int(run["steps_done"])
+    asked, done = (0 if pd.isna(run[name]) else int(run[name]) for name in STEPS)
     if run["outcome"] in COUNT:
         return Finish(run["outcome"], done, asked)
     failed = steps[~steps["outcome"].isin(COUNT)]
