@@ -23,15 +23,15 @@ GROUP = ["scenario", "mode", "exact", "tolerance", "steps_asked", "threads"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
 TITLE = "Table 1: time a projection, and the accuracy reached"
 EXPLANATION = """\
-A line a cell; those of one limit and mesh by outcome, then by time. *Time*: median of the seconds
-inside the solver over the projections with active constraints, and its *quartiles*; one that has
-nothing to move would make everybody fast. *Mean*, as in the paper: over all steps, those with
+A line a cell; those of one limit and mesh by outcome, then by time. Time: median of the seconds
+inside the solver over the projections with active constraints, and its quartiles; one that has
+nothing to move would make everybody fast. Mean, as in the paper: over all steps, those with
 nothing to move too. Both without set-up, measured by the suite. Violation, relative gap to the
 certified lower bound, and distance of a vertex from the reference optimum are the worst over all
 steps done{error}.
 
-✓ *optimal* on every step: violation at most {violation}, relative gap at most {gap}; ○ *within the
-limits* on every step, but not the projection; ✗ what went wrong: *out of time, 7 of 8* are the
+✓ optimal on every step: violation at most {violation}, relative gap at most {gap}; ○ within the
+limits on every step, but not the projection; ✗ what went wrong: out of time, 7 of 8 are the
 steps done before the clock ended the cell, or its last projection. Numbers in brackets are of such
 a cell and do not count. **Bold**: the fastest that is optimal."""
 CERTIFIED = """,
