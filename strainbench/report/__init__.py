@@ -11,14 +11,14 @@ from strainbench.bench.records import RecordsError, read_machines
 from strainbench.document import Document, Prose, Table
 from strainbench.document.page import page
 from strainbench.document.writers import csv, markdown
-from strainbench.report.chart import speed_accuracy
-from strainbench.report.energy import draw_energy, energy_table
+from strainbench.report.charts import draw_charts
+from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
 from strainbench.report.measures import measured
 from strainbench.report.names import with_names
 from strainbench.report.paper import as_latex, chosen_methods
 from strainbench.report.steps import newest_steps
-from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_tables
+from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import as_document, as_markdown, tidy
 from strainbench.report.versions import shown_runs
 
@@ -47,8 +47,8 @@ def write_report(folder: Path) -> list[Path]:
     """Write table1.csv, .md, .tex, what else there is to tell, the charts and index.html."""
     runs = load_runs(folder)
     machines = read_machines(folder)
-    charts = speed_accuracy(runs, folder / "speed-accuracy") + draw_energy(folder, runs)
-    charts += draw_sweeps(folder, runs)
+    steps = newest_steps(folder, runs)
+    charts = draw_charts(folder, runs, steps)
     drawings = [path for path in charts if path.suffix == ".svg"]
     texts = {
         "table1.csv": csv(Table.of(tidy(runs))),
