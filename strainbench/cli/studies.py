@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -81,34 +81,42 @@ def export_frame(
 
 def follow_solvers(
     scenario: OneScenario,
-    frame: FrameNumber,
+    frame: FrameNumbers,
     solver: AllSolvers = None,
     set_: SolversValues = None,
     tolerance: TightestTolerance = 1e-8,
     time_limit: SolverSeconds = 60.0,
     results: Folder = LOCAL / "convergence",
 ) -> None:
-    """Follow solvers on one projection of a scene: violation, gap and distance against time."""
+    """Follow solvers on projections of a scene: violation, gap and distance against time."""
     from strainbench.bench.machine import memory_share
     from strainbench.bench.plan import plan_scene
     from strainbench.bench.recording import recorder
     from strainbench.studies.convergence.measure import CANDIDATE, converge
     from strainbench.studies.convergence.report import write_convergence
+    from strainbench.studies.duel.measure import parse_frames
 
+    numbers = list(dict.fromkeys(number for sequence in parse_frames(frame) for number in sequence))
     cells = plan_scene(scenario, solver or ["all"], set_ or [], 1, tolerance, time_limit)
     if all(cell.solver.label == CANDIDATE for cell in cells):
         there = "the candidate itself is there in any case"
         raise ValueError(f"--solver {CANDIDATE}: {there}; the names of other solvers are valid")
-    problem = _record(recorder(cells[0]), frame)
-    ended = converge(cells, problem, frame, results, memory_share())
+    problems = _record_all(recorder(cells[0]), numbers)
+    ended = (
+        (number, *end)
+        for number, problem in zip(numbers, problems, strict=True)
+        for end in converge(cells, problem, number, results, memory_share(), problems)
+    )
     told: list[Cell] = []
+    count = len(cells) * len(numbers)
 
     def kept() -> str:
-        return f"; the rows of {len(told)} of {len(cells)} solvers are kept" if told else ""
+        return f"; the rows of {len(told)} of {count} solvers are kept" if told else ""
 
     with keeping(kept), progress() as bar:
-        for cell, ending in bar.track(ended, len(cells), description="solvers"):
-            say(f"{cell.solver.label}: {ending}", bar.console)
+        for number, cell, ending in bar.track(ended, count, description="solvers"):
+            where = f", projection {number}" if len(numbers) > 1 else ""
+            say(f"{cell.solver.label}{where}: {ending}", bar.console)
             told.append(cell)
     for written in write_convergence(results):
         say(f"wrote {written}")
@@ -191,6 +199,15 @@ def _record(cell: Cell, frame: int) -> Problem:
 
     with _playing(cell, frame) as asked:
         return record(cell, frame, asked)
+
+
+def _record_all(cell: Cell, numbers: Sequence[int]) -> list[Problem]:
+    """Several projections of a scene, in one pass."""
+    from strainbench.bench.recording import record_all
+
+    with _playing(cell, max(numbers)) as asked:
+        recording = record_all(cell, max(numbers), asked)
+    return [recording.frame(number) for number in numbers]
 
 
 def _recorded(cell: Cell, last: int, results: Path | None) -> Recording:

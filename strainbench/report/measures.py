@@ -109,11 +109,11 @@ def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
         done -= cut_off["step"].nunique()
         return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
     if run["outcome"] == NO_ANSWER:
-        return Finish(NO_ANSWER, done, asked, _cause(run["reason"]))
+        return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
     return Finish(VIOLATED, done, asked, f"violates by {power(run['max_violation'])}")
 
 
-def _cause(reason: str) -> str:
+def cause(reason: str) -> str:
     """Why there is no answer, in at most four words."""
     known = {Ending.UNAVAILABLE: "not installed", Ending.UNSUPPORTED: "refuses the problem"}
     ending = Ending.of(reason)

@@ -21,10 +21,12 @@ from strainbench.report.charts.canvas import Spec, about
 from strainbench.report.charts.chart import Chart
 from strainbench.report.charts.curves import Curve, Curves, point
 from strainbench.report.charts.target import Target
+from strainbench.report.measures import cause
 from strainbench.report.table import UNCONSTRAINED
 
 MARKS = 11  # a line has at most
 ABOVE = 10.0  # an axis ends at this many times the candidate's own measure
+HEAD = "without a sample:"
 SHORTEST = 1e-6  # seconds
 CAPTION = """\
 One projection. Filled from the first answer on that is optimal by the referee. °: whole runs at
@@ -77,9 +79,8 @@ def _chart(
     curves = []
     known = table[table[measure.column].notna() & table[effort].notna()]
     for solver, rows in known[known["solver"] != UNCONSTRAINED].groupby("solver", sort=False):
-        sign = "°" if rows["sampled_by"].iloc[0] == "tolerances" else ""
         points = _points(rows, measure, effort)
-        curves.append(Curve(about(str(solver)), f"{solver}{sign}", points))
+        curves.append(Curve(about(str(solver)), f"{solver}{_sign(rows)}", points))
     if not curves:
         return []
     start = table[table["solver"] == UNCONSTRAINED].iloc[0]
@@ -87,10 +88,32 @@ def _chart(
     x, y = _axes(curves, measure, effort, start[measure.column], target)
     band = float(start[measure.known]) if measure.known else 0.0
     levels = [(float(start[measure.column]), "the candidate itself")]
-    drawn = Curves(title, x, y, curves, band=band if np.isfinite(band) else 0, levels=levels)
-    stopped = sorted(set(table["solver"]) - set(known["solver"]))
-    caption = CAPTION + (f" Without a sample: {', '.join(stopped)}." if stopped else "")
-    return [Chart(name, title, caption.replace("\n", " "), drawn.spec(target))]
+    drawn = Curves(
+        title,
+        x,
+        y,
+        curves,
+        band=band if np.isfinite(band) else 0,
+        levels=levels,
+        failures=_failures(table, set(known["solver"])),
+        head=HEAD,
+    )
+    return [Chart(name, title, CAPTION.replace("\n", " "), drawn.spec(target))]
+
+
+def _sign(rows: pd.DataFrame) -> str:
+    """° for a method that shows no iterates."""
+    return "°" if rows["sampled_by"].iloc[0] == "tolerances" else ""
+
+
+def _failures(table: pd.DataFrame, drawn: set[str]) -> list[Spec]:
+    """Each method without a sample, and why."""
+    methods = table[table["solver"] != UNCONSTRAINED].groupby("solver", sort=False)
+    return [
+        about(str(solver)) | {"text": f"{solver}{_sign(rows)}: {cause(rows['ending'].iloc[0])}"}
+        for solver, rows in methods
+        if solver not in drawn
+    ]
 
 
 def _axes(

@@ -1,1 +1,1 @@
-"""Solvers followed on one projection: violation, gap and distance against time."""
+"""Solvers followed on projections: violation, gap and distance against time."""

@@ -95,6 +95,7 @@ def converge(
     number: int,
     folder: Path,
     memory_limit_mb: float,
+    beside: Sequence[Problem] = (),
 ) -> Iterator[tuple[Cell, str]]:
     """Run every cell's solver on `problem`; yield each with how it ended, its rows written.
 
@@ -103,6 +104,7 @@ def converge(
     Parameters
     ----------
     number : of the frame in its scene
+    beside : other frames that the folder may hold
 
     Raises
     ------
@@ -111,13 +113,13 @@ def converge(
     """
     open_folder(folder)
     with locked(folder):
+        check_folder(folder, [problem, *beside])
         yield from _converge(cells, problem, number, folder, memory_limit_mb)
 
 
 def _converge(
     cells: Sequence[Cell], problem: Problem, number: int, folder: Path, memory_limit_mb: float
 ) -> Iterator[tuple[Cell, str]]:
-    check_folder(folder, problem)
     machine, about = describe_machine(threads=1)
     remember_machine(folder, machine, about)
     judged = Judged(problem, cells[0].scenario.label, number)
@@ -139,10 +141,11 @@ def _converge(
             yield cell, str(rows[-1]["ending"])
 
 
-def check_folder(folder: Path, problem: Problem) -> None:
-    """RecordsError if `folder` holds the convergence on another frame."""
+def check_folder(folder: Path, problems: Sequence[Problem]) -> None:
+    """RecordsError if `folder` holds the convergence on a frame other than these."""
+    keys = {content_key(problem) for problem in problems}
     for row in read_rows(folder / CONVERGENCE, COLUMNS):
-        if row["problem"] != content_key(problem):
+        if row["problem"] not in keys:
             raise RecordsError(
                 f"{folder / CONVERGENCE} is about another frame ({row['scenario']}, projection "
                 f"{row['frame']}): give another --results, or move it"
@@ -150,9 +153,9 @@ def check_folder(folder: Path, problem: Problem) -> None:
 
 
 def keep(folder: Path, rows: Rows) -> None:
-    """Write down a solver's rows in place of those that it had."""
-    path = folder / CONVERGENCE
-    others = [r for r in read_rows(path, COLUMNS) if r["solver"] != rows[0]["solver"]]
+    """Write down a solver's rows in place of those that it had on the frame."""
+    path, own = folder / CONVERGENCE, {name: rows[0][name] for name in ("problem", "solver")}
+    others = [r for r in read_rows(path, COLUMNS) if {k: r[k] for k in own} != own]
     write_rows(path, COLUMNS, [*others, *rows])
 
 

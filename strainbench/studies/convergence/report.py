@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import median
 
 import pandas as pd
 
@@ -18,6 +19,7 @@ from strainbench.report.numbers import power
 from strainbench.studies.convergence.measure import CANDIDATE, COLUMNS, CONVERGENCE
 
 LEVELS = (1e-2, 1e-4, 1e-6)
+REACHED = "n of m: reached on n of m projections only."
 EXPLANATION = """\
 Each method's iterates or answers, measured by the referee: a value is reached at the first of them
 from which on all are at most that. Methods marked ° show no iterates: these are whole runs at ever
@@ -78,18 +80,53 @@ def write_convergence(folder: Path) -> list[Path]:
 
 
 def as_document(table: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> Document:
-    """Seconds and iterations to reach each level of gap and violation."""
+    """Seconds and iterations to reach each level of gap and violation, for each frame."""
+    frames = [rows for _, rows in table.groupby("problem", sort=False)]
     first = table.iloc[0]
     sizes = f"{first['variables']:.0f} variables, {first['constraints']:.0f} constraints. "
+    parts: list[Part] = [Prose(sizes + EXPLANATION.replace("\n", " "))]
+    if len(frames) == 1:
+        parts += _frame(table)
+        title = _title(first)
+    else:
+        numbers = ", ".join(f"{rows['frame'].iloc[0]:.0f}" for rows in frames)
+        title = f"{first['scenario']}, projections {numbers}"
+        parts.append(_summary(frames))
+        parts += [Document(_title(rows.iloc[0]), _frame(rows)) for rows in frames]
+    return Document(f"Convergence: {title}", [*parts, machine_section(machines)])
+
+
+def _frame(table: pd.DataFrame) -> list[Part]:
+    """What is said of one."""
     endings = [f"{name}: {rows.ending.iloc[0]}" for name, rows in methods(table)]
-    parts: list[Part] = [
-        Prose(sizes + EXPLANATION.replace("\n", " ")),
+    return [
         _table(table, "relative_gap", "relative gap"),
         _table(table, "max_violation", "violation"),
         Document("How each ended", [Items(endings)]),
-        machine_section(machines),
     ]
-    return Document(f"Convergence: {_title(first)}", parts)
+
+
+def _summary(frames: Sequence[pd.DataFrame]) -> Table:
+    """A line a method: its median seconds to each level of the gap, where it reached it on all."""
+    times: dict[str, list[list[float]]] = {}
+    for frame in frames:
+        for label, rows in methods(frame):
+            found = [reached(rows, "relative_gap", level) for level in LEVELS]
+            seconds = [float("nan") if sample is None else sample["seconds"] for sample in found]
+            times.setdefault(label, []).append(seconds)
+    lines = []
+    for label, each in times.items():
+        texts = [_median(list(level), len(frames)) for level in zip(*each, strict=True)]
+        lines.append([label, *texts])
+    header = [Column("method", whole=True), *(Column(power(level), "s") for level in LEVELS)]
+    title = "To reach a relative gap: medians over the projections"
+    return Table(title, header, lines, notes=[REACHED])
+
+
+def _median(seconds: Sequence[float], frames: int) -> str:
+    """Of all frames; else on how many the level was reached."""
+    known = [s for s in seconds if s == s]
+    return f"{median(known):.2g}" if len(known) == frames else f"{len(known)} of {frames}"
 
 
 def _title(sample: pd.Series) -> str:
