@@ -40,10 +40,10 @@ LATEX = str.maketrans(
         ">": r"\textgreater{}",
         "|": r"\textbar{}",
         "`": r"\textasciigrave{}",
-        "·": r"\textperiodcentered{}",
-        "×": r"\texttimes{}",
-        "°": r"\textdegree{}",
-        "µ": r"\textmu{}",
+        "·": r"$\cdot$",
+        "×": r"$\times$",
+        "°": r"$^\circ$",
+        "µ": r"$\mu$",
         "→": r"$\to$",
         "≤": r"$\le$",
         "≥": r"$\ge$",
@@ -55,7 +55,12 @@ LATEX = str.maketrans(
 
 def plain(text: object) -> str:
     """One line that changes nothing on a terminal: no control characters, no ANSI sequences."""
-    return " ".join(UNSEEN.sub(" ", ANSI.sub("", str(text))).split())
+    return " ".join(seen(str(text)).split())
+
+
+def seen(text: str) -> str:
+    """Without control characters and ANSI sequences, all spaces as they are."""
+    return UNSEEN.sub(" ", ANSI.sub("", text))
 
 
 def terminal(text: object) -> Text:

@@ -6,6 +6,7 @@ import csv
 import io
 import re
 from html import unescape
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -16,12 +17,15 @@ from rich.console import Console
 
 from strainbench import escape
 from strainbench.document import (
+    Between,
     Code,
     Column,
     Document,
+    Faint,
     Items,
     Picture,
     Prose,
+    Span,
     Strong,
     Table,
     writers,
@@ -56,14 +60,62 @@ def test_a_table_in_markdown():
     )
 
 
-def test_a_table_in_latex_has_no_column_that_stands_aside():
-    assert writers.latex([TABLE]) == (
-        "% Times\n% run --it\n\\begin{tabular}{lrl}\n"
-        "method & time [s] & share \\\\ \\hline\n"
-        "newton & 1.23 & 50\\% \\\\\n"
-        "\\textbf{best} & 2 & - \\\\\n"
-        "\\end{tabular}\n"
-    )
+def test_a_table_in_latex_stands_in_an_article():
+    written = writers.latex([TABLE])
+    for words in (
+        "% run --it\n\\begin{table}\n\\centering\\caption{Times}\n",
+        "\\begin{tabular}{@{}lS[table-format=1.2,detect-weight]ll@{}}\n\\toprule\n",
+        "method & {time [s]} & said & share \\\\\n\\midrule\n",
+        "newton & 1.23 & a & 50\\% \\\\\n\\textbf{best} & 2 & - & - \\\\\n\\bottomrule\n",
+        "\\parbox{\\linewidth}{\\scriptsize a note}\n\\end{table}\n",
+    ):
+        assert words in written
+
+
+NUMBERS = Table(
+    "",
+    ["m", Column("t", "s", right=True, above="fine"), Column("", above="fine")],
+    [
+        [Span.of("worse", 3)],
+        ["a", Strong("12"), Between.of("8.5", "13")],
+        ["b", "<0.010", ""],
+        ["c", Span.of("× by 3e-2", 2)],
+        ["d", Faint("7"), ""],
+    ],
+    notes=[Prose("At most 1e-6.")],
+    label="here",
+)
+
+
+def test_numbers_of_a_paper_are_aligned_and_what_spans_columns_does():
+    written = writers.latex([NUMBERS]).splitlines()
+    lines = [line for line in written if line.endswith(r"\\")]
+    assert lines == [
+        r" & \multicolumn{2}{c}{fine} \\",
+        r"m & \multicolumn{2}{c}{t [s]} \\",
+        r"\addlinespace \multicolumn{3}{@{}l}{\itshape worse} \\",
+        r"a & \bfseries 12 & \quartiles{13}{8.5} \\",
+        r"b & <0.010 &  \\",
+        r"c & \multicolumn{2}{l}{$\times$ by \num{3e-2}} \\",
+        r"d &  &  \\",
+    ]
+    assert r"\cmidrule(l){2-3}" in written
+    assert r"\begin{tabular}{@{}lS[table-format=<2.3,detect-weight]@{\,}l@{}}" in written
+    assert r"\label{tab:here}" in written
+    assert any(r"At most \num{1e-6}." in line for line in written)
+
+
+def test_what_spans_columns_stands_in_the_first_of_them_elsewhere():
+    written = writers.markdown(NUMBERS)
+    for line in ("| worse |  |  |", "| a | **12** | 8.5 to 13 |", "| d | (7) |  |"):
+        assert line in written
+    assert writers.csv(NUMBERS).splitlines()[1:3] == ["worse,,", "a,12,8.5 to 13"]
+
+
+def test_a_figure_in_latex():
+    written = writers.latex([Picture(Path("a/b.pdf"), "50% done")])
+    assert r"\includegraphics[width=\linewidth]{a/b.pdf}" in written
+    assert r"\caption{50\% done}" in written
 
 
 def test_csv_has_every_digit():
@@ -144,7 +196,8 @@ def test_a_page_takes_any_text(words):
 def test_latex_has_no_character_that_means_something(words):
     written = writers.latex([everywhere(words).parts[0]])
     plain, latex = escape.plain(words), escape.latex(words)
-    assert written.splitlines()[:2] == [f"% {plain}"] * 2
+    assert written.splitlines()[0] == f"% {plain}"
+    assert f"\\caption{{{latex}}}" in written
     assert f"{latex} & \\textbf{{{latex}}} \\\\" in written
 
 

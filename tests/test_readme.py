@@ -91,6 +91,23 @@ def test_example_table_is_short_and_stands_in_the_report(tmp_path, monkeypatch):
         assert line in written
 
 
+def test_the_table_of_results_is_what_the_committed_rows_come_to():
+    from strainbench.document.writers import markdown
+    from strainbench.report import load_runs
+    from strainbench.report.table import groups
+
+    (group,) = groups(load_runs(ROOT / "results/swing-short"))
+    measured = set(markdown(group.table()).replace("**", "").splitlines())
+    head = "| method | | time [ms] |"
+    table = README[README.index(head) :].partition("\n\n")[0].replace("**", "").splitlines()[2:]
+    for line in table:
+        name, *cells = [cell.strip() for cell in line.strip("|").split("|")]
+        method = f"| 1% | 20×20 | {name.split(' (')[0]} | {cells[0].removesuffix(' in 30 s')} | "
+        (row,) = (line for line in measured if line.startswith(method))
+        assert not cells[1] or row == f"{method}{' | '.join(cells[1:])} |"
+    assert len(table) == 8
+
+
 @pytest.mark.parametrize("target", re.findall(r"`make ([a-z-]+)`", README))
 def test_make_targets_exist(target):
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE)

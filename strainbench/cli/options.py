@@ -135,6 +135,21 @@ Processes = Annotated[
 ]
 Rerun = Annotated[bool, typer.Option("--rerun", help="run finished cells again")]
 
+# what is reported
+Paper = Annotated[
+    bool,
+    typer.Option("--paper", help="only what an article takes, into paper/: tables, figures as PDF"),
+]
+Methods = Annotated[
+    str | None, typer.Option("--methods", help="of the paper's tables, a,b; all by default")
+]
+Columns = Annotated[
+    str | None,
+    typer.Option(
+        "--columns", help="of the paper's tables, of seconds,mean,violation,gap,mm [seconds,mm]"
+    ),
+]
+
 # where it goes, and how it looks
 Folder = Annotated[Path, _folder("folder of the results")]
 FramesFolder = Annotated[Path, _folder("folder that keeps the frames")]

@@ -8,17 +8,30 @@ from typing import Annotated
 import typer
 
 from strainbench.cli.display import console, say
-from strainbench.cli.options import LOCAL, Folder, TableFile
-from strainbench.options import path
+from strainbench.cli.options import LOCAL, Columns, Folder, Methods, Paper, TableFile
+from strainbench.options import WrongWordError, path
 
 
-def report_results(results: Folder = LOCAL / "run") -> None:
+def report_results(
+    results: Folder = LOCAL / "run",
+    paper: Paper = False,
+    methods: Methods = None,
+    columns: Columns = None,
+) -> None:
     """Write tables (CSV, Markdown, LaTeX), charts and an HTML page from results."""
     from strainbench.files import disk_errors
-    from strainbench.report import write_report
 
+    if not paper and (methods or columns) is not None:
+        raise WrongWordError("--methods and --columns choose what --paper writes: give it too")
     with disk_errors(results):
-        paths = write_report(results)
+        if paper:
+            from strainbench.report.article import write_paper
+
+            paths = write_paper(results, methods, columns)
+        else:
+            from strainbench.report import write_report
+
+            paths = write_report(results)
     for written in paths:
         say(f"wrote {written}")
 

@@ -8,7 +8,7 @@ Texts are given as they are, whatever they hold: the writers escape them, each i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,37 @@ if TYPE_CHECKING:
 
 class Strong(str):
     """Text that stands out."""
+
+
+class Faint(str):
+    """A number that does not count, as what it is of went wrong."""
+
+
+class Between(str):
+    """From a lower number to a higher one, as texts."""
+
+    low: str
+    high: str
+
+    @classmethod
+    def of(cls, low: str, high: str) -> Between:
+        """The two; nothing where there are none."""
+        text = cls(f"{low} to {high}" if low else "")
+        text.low, text.high = low, high
+        return text
+
+
+class Span(str):
+    """What stands in place of several cells, from the first of them on."""
+
+    width: int
+
+    @classmethod
+    def of(cls, text: str, width: int) -> Span:
+        """Over `width` columns."""
+        words = cls(text)
+        words.width = width
+        return words
 
 
 class Code(str):
@@ -38,7 +69,8 @@ class Column:
     form : of its numbers that are no whole ones: a format such as ".3g", or a function
     right : flushed right, as numbers are
     whole : never folded on a narrow terminal
-    aside : says more of the column before; LaTeX leaves it out
+    aside : says more of the column before
+    above : stands above it and its neighbours of the same
     """
 
     name: str
@@ -47,6 +79,7 @@ class Column:
     right: bool = False
     whole: bool = False
     aside: bool = False
+    above: str = ""
 
     @property
     def heading(self) -> str:
@@ -71,10 +104,12 @@ class Table:
     Parameters
     ----------
     header : a column, or its name alone
-    lines : cells are text, numbers, or None; CSV has numbers with all their digits
+    lines : cells are text, numbers, or None; a `Span` is several. CSV has numbers with all their
+        digits
     about : a paragraph above
     notes : a list below
     command : that made the table
+    label : by which an article refers to it
     nothing : stands where there is no value
     """
 
@@ -85,6 +120,7 @@ class Table:
     notes: Sequence[str] = ()
     command: str = ""
     nothing: str = ""
+    label: str = ""
 
     @classmethod
     def of(cls, frame: pd.DataFrame) -> Table:
@@ -102,18 +138,21 @@ class Table:
         """The header as it is shown."""
         return [column.heading for column in self.columns]
 
+    @property
+    def cells(self) -> list[list[object]]:
+        """The lines with a cell a column: what spans several stands in the first of them."""
+        return [[cell for value in line for cell in _spread(value)] for line in self.lines]
+
     def texts(self) -> list[list[str]]:
         """The cells as they are shown."""
         return [
             [c.text(value, self.nothing) for c, value in zip(self.columns, line, strict=True)]
-            for line in self.lines
+            for line in self.cells
         ]
 
-    def only(self, wanted: Callable[[Column], bool]) -> Table:
-        """The same with some of the columns."""
-        kept = [k for k, column in enumerate(self.columns) if wanted(column)]
-        lines = [[line[k] for k in kept] for line in self.lines]
-        return replace(self, header=[self.columns[k] for k in kept], lines=lines)
+
+def _spread(value: object) -> list[object]:
+    return [value] + [""] * (value.width - 1 if isinstance(value, Span) else 0)
 
 
 @dataclass(frozen=True)

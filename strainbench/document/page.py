@@ -8,7 +8,7 @@ from jinja2 import Environment, PackageLoader, Template
 from markdown_it import MarkdownIt
 from markupsafe import Markup, escape
 
-from strainbench.document import Code, Document, Picture, Prose, Strong, blocks
+from strainbench.document import Code, Document, Faint, Picture, Prose, Strong, blocks
 from strainbench.escape import plain
 
 
@@ -39,7 +39,7 @@ def _inline(text: str) -> Markup:
     if isinstance(text, Prose):
         return Markup(MarkdownIt("commonmark", {"html": False}).renderInline(text))
     words = escape(plain(text))
-    tags = {Code: "code", Strong: "strong"}
+    tags = {Code: "code", Strong: "strong", Faint: "small"}
     tag = next((tag for kind, tag in tags.items() if isinstance(text, kind)), "")
     return Markup(f"<{tag}>{words}</{tag}>") if tag else words
 

@@ -1,10 +1,9 @@
-"""A document as Markdown; a table as LaTeX, as CSV and on a terminal."""
+"""A document as Markdown; a table as CSV, on a terminal and, from `latex`, in an article."""
 
 from __future__ import annotations
 
 import csv as csv_
 import io
-from collections.abc import Iterable
 
 from rich import box
 from rich.console import JustifyMethod
@@ -14,6 +13,7 @@ from strainbench import escape
 from strainbench.document import (
     Block,
     Code,
+    Faint,
     Heading,
     Items,
     Part,
@@ -23,6 +23,9 @@ from strainbench.document import (
     Table,
     blocks,
 )
+from strainbench.document.latex import latex
+
+__all__ = ["csv", "latex", "markdown", "terminal"]
 
 
 def markdown(part: Part) -> str:
@@ -55,34 +58,18 @@ def _inline(text: str) -> str:
             return escape.code(text)
         case Strong():
             return f"**{escape.markdown(text)}**" if escape.plain(text) else ""
+        case Faint():
+            return f"({escape.markdown(text)})" if escape.plain(text) else ""
         case _:
             return escape.markdown(text)
-
-
-def latex(tables: Iterable[Table]) -> str:
-    """Tabulars, their titles as comments; columns that stand aside are left out."""
-    return "\n\n".join(_tabular(table.only(lambda c: not c.aside)) for table in tables) + "\n"
-
-
-def _tabular(table: Table) -> str:
-    lines = (table.headings, *table.texts())
-    header, *rows = (" & ".join(map(_latex, line)) + r" \\" for line in lines)
-    above = [f"% {escape.plain(text)}" for text in (table.title, table.command) if text]
-    sides = "".join("r" if column.right else "l" for column in table.columns)
-    begin, end = rf"\begin{{tabular}}{{{sides}}}", r"\end{tabular}"
-    return "\n".join([*above, begin, rf"{header} \hline", *rows, end])
-
-
-def _latex(text: str) -> str:
-    words = escape.latex(text)
-    return rf"\textbf{{{words}}}" if isinstance(text, Strong) else words
 
 
 def csv(table: Table) -> str:
     """One line a line, numbers with all their digits."""
     buffer = io.StringIO()
     writer = csv_.writer(buffer, lineterminator="\n")
-    writer.writerows(map(escape.cell, line) for line in (table.headings, *table.lines))
+    writer.writerow(map(escape.cell, table.headings))
+    writer.writerows(map(escape.cell, line) for line in table.cells)
     return buffer.getvalue()
 
 

@@ -16,14 +16,17 @@ from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
 from strainbench.report.measures import measured
 from strainbench.report.names import with_names
+from strainbench.report.paper import as_latex, chosen_methods
 from strainbench.report.steps import newest_steps
 from strainbench.report.sweep import BEYOND, sweep_tables
-from strainbench.report.table import as_document, as_latex, as_markdown, tidy
+from strainbench.report.table import as_document, as_markdown, tidy
 from strainbench.report.versions import shown_runs
 
 
 def load_runs(folder: Path) -> pd.DataFrame:
-    """The row of each cell that is shown, numbers as numbers; see `strainbench.report.versions`.
+    """The row of each cell that is shown, numbers as numbers, with what it comes to.
+
+    See `strainbench.report.versions`, `names` and `measures`.
 
     Raises
     ------
@@ -36,7 +39,8 @@ def load_runs(folder: Path) -> pd.DataFrame:
     runs = pd.DataFrame(rows)
     for column in runs.columns.difference([*WORDS, "older"]):
         runs[column] = pd.to_numeric(runs[column])
-    return with_names(runs)
+    named = with_names(runs)
+    return measured(named, newest_steps(folder, named))
 
 
 def write_report(folder: Path) -> list[Path]:
@@ -44,12 +48,12 @@ def write_report(folder: Path) -> list[Path]:
     runs = load_runs(folder)
     machines = read_machines(folder)
     steps = newest_steps(folder, runs)
-    charts = draw_charts(folder, measured(runs, steps), steps)
+    charts = draw_charts(folder, runs, steps)
     drawings = [path for path in charts if path.suffix == ".svg"]
     texts = {
         "table1.csv": csv(Table.of(tidy(runs))),
         "table1.md": as_markdown(runs, machines),
-        "table1.tex": as_latex(runs),
+        "table1.tex": as_latex(chosen_methods(runs, None)),
         "index.html": page(as_document(runs, machines, "strainbench results", drawings)),
     }
     if swept := sweep_tables(runs):

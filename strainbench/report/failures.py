@@ -18,7 +18,8 @@ from strainbench.bench.ending import Ending
 from strainbench.document import Document, Items, Prose, Table
 from strainbench.referee.certificate import OUTCOMES
 from strainbench.report.machine import machine_section
-from strainbench.report.numbers import distance_text, power
+from strainbench.report.measures import OUT_OF_TIME, distance_of
+from strainbench.report.numbers import power
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
 from strainbench.scenario.registry import find_scenario
@@ -27,8 +28,8 @@ EXPLANATION = """\
 Signs: ✓ optimal on every step (violation at most {violation}, relative gap at most {gap}), or an
 infeasible case called infeasible; ○ within the limits but not optimal (relative gap, distance of
 the farthest vertex), or an infeasible case on which the method gave up without a claim; ✗ limits
-violated (by how much, and what the method itself says), an infeasible case called solved, or no
-usable answer. What is shown is the worst step.
+violated (by how much, and what the method itself says), out of time (after how many steps), an
+infeasible case called solved, or no usable answer. What is shown is the worst step.
 
 Each failure is checked on an easier neighbour of its case. Where the method does better there, and
 within the limits, the failure is the method's. †: it does not, by its nature or by a fault of
@@ -122,7 +123,9 @@ def _judge(row: pd.Series, status: str) -> tuple[str, str]:
     if row["outcome"] == "feasible":
         if pd.isna(row["relative_gap_max"]):
             return PARTLY, "local"
-        return PARTLY, f"gap {power(row['relative_gap_max'])}, {distance_text(row)} mm"
+        return PARTLY, f"gap {power(row['relative_gap_max'])}, {distance_of(row) or '?'} mm"
+    if row["ending"] == OUT_OF_TIME:
+        return FAILED, f"out of time, {row['why']}"
     if row["outcome"] == "violated":
         return FAILED, f"violated by {power(row['max_violation'])}, says {status}"
     return FAILED, f"no answer, says {status}" if status else row["reason"].split(" (")[0]

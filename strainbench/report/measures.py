@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import floor, isfinite, log10, nan
+from math import floor, inf, isfinite, log10, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ COUNT = (OPTIMAL, FEASIBLE)
 SIGNS = {OPTIMAL: "✓", FEASIBLE: "○", VIOLATED: "✗", OUT_OF_TIME: "✗", NO_ANSWER: "✗"}
 CLOCK = ("time limit", "time_limit", "user_limit", "time out", "timeout", "max_time")
 """What solvers say, in lower case, where the clock ended a projection."""
+STEPS = ("steps_asked", "steps_done")
 NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
 
@@ -72,7 +73,7 @@ class Finish:
 def numbers(steps: pd.DataFrame) -> pd.DataFrame:
     """Rows of steps.csv with numbers as numbers."""
     columns = [c for c in STEP_COLUMNS if c in steps and c not in WORDS]
-    parsed = {c: pd.to_numeric(steps[c].replace("", nan)) for c in columns}
+    parsed = {c: steps[c].replace("", nan).astype(object).astype(float) for c in columns}
     return steps.assign(**parsed)
 
 
@@ -98,17 +99,17 @@ def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
     ----------
     steps : of this cell
     """
-    asked, done = int(run["steps_asked"]), int(run["steps_done"])
-    if run["outcome"] == NO_ANSWER:
-        if Ending.of(run["reason"]) is Ending.TIME_LIMIT:
-            return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
-        return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
+    asked, done = (0 if pd.isna(run[name]) else int(run[name]) for name in STEPS)
     if run["outcome"] in COUNT:
         return Finish(run["outcome"], done, asked)
     failed = steps[~steps["outcome"].isin(COUNT)]
-    if len(failed) and failed["status"].map(by_clock).all():
-        done -= failed["step"].nunique()
+    cut_off = failed[failed["status"].map(by_clock).astype(bool)]
+    ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
+    if ended or (run["outcome"] != NO_ANSWER and 0 < len(cut_off) == len(failed)):
+        done -= cut_off["step"].nunique()
         return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
+    if run["outcome"] == NO_ANSWER:
+        return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
     return Finish(VIOLATED, done, asked, f"violates by {power(run['max_violation'])}")
 
 
@@ -178,3 +179,14 @@ def distance_text(mm: float, error_mm: float) -> str:
     if mm != mm:
         return ""
     return f"<{digits(error_mm)}" if mm < error_mm else digits(mm)
+
+
+def seconds_text(seconds: float) -> str:
+    """Two significant digits; nothing where there are none."""
+    return digits(seconds) if isfinite(seconds) else ""
+
+
+def distance_of(row: pd.Series) -> str:
+    """A cell's largest distance in mm; nothing where it or the reference's error is unknown."""
+    mm, error = 1000 * row["distance_max"], 1000 * row["reference_error_max"]
+    return distance_text(mm, error) if isfinite(mm) and error != inf else ""

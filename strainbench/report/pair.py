@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from strainbench.bench.records import Row
+from strainbench.report.measures import seconds_text
 from strainbench.report.names import (
     SPANNED,
     cells,
@@ -15,7 +16,7 @@ from strainbench.report.names import (
     mesh_name,
     settings,
 )
-from strainbench.report.numbers import power, seconds_text
+from strainbench.report.numbers import power
 from strainbench.report.table import UNCONSTRAINED
 
 SAME = (

@@ -7,8 +7,9 @@ import json
 import pandas as pd
 
 from strainbench.document import Column, Table
+from strainbench.report.lines import MEASURES, marked, ranked
 from strainbench.report.names import describe, digits, digits_of, settings
-from strainbench.report.table import ACCURACY, UNCONSTRAINED, accuracy_text, time_text
+from strainbench.report.table import UNCONSTRAINED
 
 FEWEST = 3  # values of a setting that make a sweep
 APART = 1.6  # times the largest number: where a chart has the words among the values
@@ -50,13 +51,13 @@ def beyond(rows: pd.DataFrame) -> pd.Series:
     return (rows["max_principal_stretch"] - (1 + rows["limit"])).clip(lower=0)
 
 
-def beyond_text(row: pd.Series | None) -> str:
+def beyond_text(row: pd.Series) -> str:
     """The same of one cell."""
-    return "" if row is None or pd.isna(row["beyond"]) else f"{row['beyond']:.2g}"
+    return "" if pd.isna(row["beyond"]) else f"{row['beyond']:.2g}"
 
 
 def sweep_tables(runs: pd.DataFrame) -> list[Table]:
-    """A table for each sweep: rows are values, columns solvers."""
+    """A table for each sweep: a line a value and solver."""
     return [
         _table(key, group, rows)
         for key, rows in sweeps(runs).items()
@@ -66,18 +67,15 @@ def sweep_tables(runs: pd.DataFrame) -> list[Table]:
 
 def _table(key: str, group: pd.DataFrame, rows: pd.DataFrame) -> Table:
     """That of one line among the rows of its sweep."""
-    first, solvers = group.iloc[0], list(dict.fromkeys(group["solver"]))
+    first = group.iloc[0]
     rest = describe(first["rest"], (), digits(rows["rest"]))
     about = ", ".join(filter(None, (first["mode"], rest, *_how(first, rows))))
-    header: list[str | Column] = [key]
-    for solver in solvers:
-        header += [Column(solver, "s"), ACCURACY, "beyond"]
-    lines = []
-    for _, at in group.groupby("value"):
-        by_solver = {r["solver"]: r for _, r in at.iterrows()}
-        cells = [by_solver.get(solver) for solver in solvers]
-        texts = [text(c) for c in cells for text in (time_text, accuracy_text, beyond_text)]
-        lines.append([at["shown"].iloc[0], *texts])
+    lines = [
+        [row["shown"], *texts, beyond_text(row)]
+        for _, at in group.groupby("value")
+        for row, texts in marked(ranked(at))
+    ]
+    header: list[str | Column] = [key, "method", *MEASURES, "beyond"]
     return Table(f"{first['scenario']} against {key} ({about})", header, lines)
 
 

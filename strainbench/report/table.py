@@ -1,4 +1,4 @@
-"""Table 1 in the shape of Tang et al. 2022, with the accuracy reached beside each time."""
+"""Table 1: the outcome of each cell, its time, and the accuracy reached."""
 
 from __future__ import annotations
 
@@ -10,29 +10,41 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from strainbench.bench.ending import Ending
-from strainbench.document import Column, Document, Items, Part, Picture, Prose, Strong, Table
-from strainbench.document.writers import latex, markdown
+from strainbench.document import Column, Document, Items, Part, Picture, Prose, Table
+from strainbench.document.writers import markdown
 from strainbench.report import warm
+from strainbench.report.lines import MEASURES, marked, milliseconds, ranked
 from strainbench.report.machine import machine_section
+from strainbench.report.measures import COUNT, NO_ANSWER
 from strainbench.report.names import digits_of
-from strainbench.report.numbers import distance_text, power, seconds_text
+from strainbench.report.numbers import power
 
 GROUP = ["scenario", "mode", "exact", "tolerance", "steps_asked", "threads"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
-TITLE = "Table 1: seconds a projection, and the accuracy reached"
-ACCURACY = "violation · gap · mm"
+TITLE = "Table 1: time a projection, and the accuracy reached"
 EXPLANATION = """\
-Seconds are means over projections of the time inside the solver, set-up apart, measured by the
-suite. `*`: some steps did not converge (the referee finds a violation above {violation}) or the
-cell's time ran out, the steps done in brackets and the time spent on the last one counted as far
-as it went; `-`: no usable answer. Beside each time stands
-what the referee found, at its worst over all steps done: largest violation, relative gap to the
-certified lower bound, largest distance of a vertex from the reference optimum in mm{error}.
-**Bold**: optimal on every step (violation at most {violation}, relative gap at most {gap})."""
+A line a cell; those of one limit and mesh by outcome, then by time. Time: median of the seconds
+inside the solver over the projections with active constraints, and its quartiles; one that has
+nothing to move would make everybody fast. Mean, as in the paper: over all steps, those with
+nothing to move too. Both without set-up, measured by the suite. Violation, relative gap to the
+certified lower bound, and distance of a vertex from the reference optimum are the worst over all
+steps done{error}.
+
+✓ optimal on every step: violation at most {violation}, relative gap at most {gap}; ○ within the
+limits on every step, but not the projection; ✗ what went wrong: out of time, 7 of 8:
+so many steps were done before the clock ended the cell, or its last projection. Numbers in brackets
+are of such a cell and do not count. **Bold**: the fastest that is optimal."""
 CERTIFIED = """,
-itself certified to within {error:.1g} mm or, for most cells, better: `<` is a bound on a distance
+itself certified to within {error:.1g} mm or, for most cells, better: `<` is said of a distance
 that is smaller than what its own cell's reference is certified to"""
+EULER = "implicit Euler, a step"
+TIMES = {
+    "time": "median_seconds",
+    "time_low": "first_quartile_seconds",
+    "time_high": "third_quartile_seconds",
+    "time_count": "projections_with_active_constraints",
+}
+"""Columns of measures, and how table1.csv calls them."""
 OLDER = "Older than what is installed, and to be had anew with `strainbench run ... --rerun`:"
 LOCAL = """
 *Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
@@ -57,35 +69,38 @@ class Group:
         """The looser the later."""
         return list(self.runs.sort_values(["limit", "bound"])["bound"].unique())
 
-    def blocks(self) -> Iterator[tuple[str, str, list[pd.Series | None]]]:
-        """(limit, solver, row or None for each mesh), implicit Euler left out."""
-        constrained = self.runs[self.runs["solver"] != UNCONSTRAINED]
-        for limit in self.limits:
-            block = constrained[constrained["bound"] == limit]
-            for solver in warm.beside_twins(list(block["solver"].unique())):
-                rows = block[block["solver"] == solver]
-                by_mesh = {r["mesh"]: r for _, r in rows.iterrows()}
-                yield limit, solver, [by_mesh.get(name) for name in self.meshes]
+    def by_limit(self) -> Iterator[tuple[str, pd.DataFrame]]:
+        """The cells of each limit."""
+        yield from ((limit, self.runs[self.runs["bound"] == limit]) for limit in self.limits)
 
-    def implicit_euler(self) -> list[float]:
-        """Mean seconds a step of unconstrained implicit Euler, NaN for a mesh on which it did not
-        run to its end; nothing where it did on none, or where there is no physics."""
+    def blocks(self) -> Iterator[pd.DataFrame]:
+        """The cells of each limit and mesh, by outcome, then by time; implicit Euler left out."""
+        for _, rows in self.by_limit():
+            constrained = rows[rows["solver"] != UNCONSTRAINED]
+            yield from (ranked(constrained[constrained["mesh"] == mesh]) for mesh in self.meshes)
+
+    def implicit_euler(self) -> dict[str, float]:
+        """Mean seconds a step of unconstrained implicit Euler on each mesh on which it ran to its
+        end; nothing where there is no physics."""
         ran = self.runs[(self.runs["solver"] == UNCONSTRAINED) & (self.runs["ie_seconds_mean"] > 0)]
         means = (
             ran[ran["steps_done"] == ran["steps_asked"]].groupby("mesh")["ie_seconds_mean"].mean()
         )
-        return [float(means.get(n, float("nan"))) for n in self.meshes] if len(means) else []
+        return {mesh: float(means[mesh]) for mesh in self.meshes if mesh in means}
 
     def table(self) -> Table:
-        """A line a limit and solver, a time and what it reached a mesh."""
-        header: list[str | Column] = ["limit", "method"]
-        for name in self.meshes:
-            header += [Column(name, "s", right=True), Column(ACCURACY, aside=True)]
-        means = [cell for mean in self.implicit_euler() for cell in (seconds_text(mean), "")]
-        lines = [["", "implicit Euler", *means]] if means else []
-        for limit, solver, rows in self.blocks():
-            lines.append([limit, solver, *(text for row in rows for text in measured(row))])
-        return Table(self.title, header, lines)
+        """A line a cell, below those of implicit Euler."""
+        euler = [
+            ["", mesh, EULER, "", "", "", milliseconds(mean), "", "", ""]
+            for mesh, mean in self.implicit_euler().items()
+        ]
+        header: list[str | Column] = ["limit", "mesh", "method", *MEASURES]
+        cells = [
+            [row["bound"], row["mesh"], *texts]
+            for block in self.blocks()
+            for row, texts in marked(block)
+        ]
+        return Table(self.title, header, [*euler, *cells])
 
 
 def groups(runs: pd.DataFrame) -> Iterator[Group]:
@@ -101,44 +116,9 @@ def groups(runs: pd.DataFrame) -> Iterator[Group]:
 
 def mark(row: pd.Series) -> str:
     """ "-" for no usable answer, "*" for some steps not converged, else nothing."""
-    cut_off = row["steps_done"] < row["steps_asked"]
-    by_clock = Ending.of(row["reason"]) is Ending.TIME_LIMIT
-    if cut_off and (row["steps_done"] == 0 or not by_clock):
+    if row["ending"] == NO_ANSWER or row["steps_done"] == 0:
         return "-"
-    return "*" if cut_off or row["projections_violated"] > 0 else ""
-
-
-def time_text(row: pd.Series | None) -> str:
-    """Seconds a projection with its mark."""
-    if row is None:
-        return ""
-    if mark(row) == "-":
-        return "-"
-    steps = row["steps_asked"] - row["steps_done"]
-    done = f" ({row['steps_done']:.0f}/{row['steps_asked']:.0f})" if steps else ""
-    return f"{mark(row)}{seconds_text(row['solve_seconds_mean'])}{done}"
-
-
-def measured(row: pd.Series | None) -> tuple[str, str]:
-    """Time and accuracy; the time of what is optimal stands out."""
-    time = time_text(row)
-    optimal = row is not None and row["outcome"] == "optimal"
-    return Strong(time) if optimal else time, accuracy_text(row)
-
-
-def accuracy_text(row: pd.Series | None) -> str:
-    """Violation, relative gap, distance in mm."""
-    if row is None or mark(row) == "-" or pd.isna(row["max_violation"]):
-        return ""
-    if pd.isna(row["relative_gap_max"]):
-        return f"{power(row['max_violation'])} · local"
-    return " · ".join(
-        (
-            power(row["max_violation"]),
-            power(row["relative_gap_max"]),
-            distance_text(row),
-        )
-    )
+    return "" if row["ending"] in COUNT else "*"
 
 
 def tidy(runs: pd.DataFrame) -> pd.DataFrame:
@@ -146,6 +126,8 @@ def tidy(runs: pd.DataFrame) -> pd.DataFrame:
     named = [name.replace("exact", "setting") for name in GROUP]
     table = runs[[*named, "resolution", "limit", "solver"]].copy()
     table["seconds"] = runs["solve_seconds_mean"]
+    for column, name in TIMES.items():
+        table[name] = runs[column]
     table["mark"] = [mark(row) for _, row in runs.iterrows()]
     table["ie_seconds_mean"] = runs["ie_seconds_mean"].where(runs["ie_seconds_mean"] > 0)
     for column in ("outcome", "max_violation", "relative_gap_max"):
@@ -154,6 +136,7 @@ def tidy(runs: pd.DataFrame) -> pd.DataFrame:
     table["reference_error_mm"] = 1000 * runs["reference_error_max"]
     for column in ("max_principal_stretch", "iterations_mean", "steps_done", "reason", "machine"):
         table[column] = runs[column]
+    table["ending"], table["done"], table["why"] = runs["ending"], runs["done"], runs["why"]
     table["mesh"] = runs["mesh"]
     table["older"] = runs["older"]
     return table
@@ -165,8 +148,8 @@ def explanation(runs: pd.DataFrame) -> str:
     errors = runs["reference_error_max"].replace(np.inf, np.nan).dropna()  # of infeasible frames
     local = runs["max_violation"].notna() & runs["relative_gap_max"].isna()
     return EXPLANATION.format(
-        violation=thresholds["violation_threshold"],
-        gap=thresholds["gap_threshold"],
+        violation=power(thresholds["violation_threshold"]),
+        gap=power(thresholds["gap_threshold"]),
         error=CERTIFIED.format(error=1000 * errors.max()) if len(errors) else "",
     ) + (LOCAL if local.any() else "")
 
@@ -255,8 +238,3 @@ def as_document(
 def as_markdown(runs: pd.DataFrame, machines: Mapping[str, Mapping[str, object]]) -> str:
     """The same as a file, without charts."""
     return markdown(as_document(runs, machines))
-
-
-def as_latex(runs: pd.DataFrame) -> str:
-    """The times alone, as tabulars in the paper's shape."""
-    return latex(group.table() for group in groups(runs))

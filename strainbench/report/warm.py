@@ -7,13 +7,17 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from strainbench.document import Prose, Table
-from strainbench.report.numbers import distance_text
+from strainbench.document import Column, Prose, Table
+from strainbench.report.measures import COUNT, distance_of
 
-HEADER = ("scene", "limit", "method", "seconds, cold / warm", "iterations", "distance [mm]")
+HEADER: tuple[str | Column, ...] = (
+    *("scene", "limit", "method", Column("cold over warm", right=True)),
+    *(Column(f"{start} iterations", right=True) for start in ("cold", "warm")),
+    *(Column(f"{start} distance", "mm", right=True) for start in ("cold", "warm")),
+)
 EXPLANATION = """\
 Ratio of the medians of seconds a projection, cold over warm, where both did all steps within the
-limits, else the two outcomes; mean iterations and largest distance to the optimum, cold and warm.
+limits, else the two outcomes; mean iterations and largest distance to the optimum.
 In `simulate` each start has frames of its own, in `replay` both have the same."""
 SUFFIX = "-warm"
 
@@ -28,8 +32,8 @@ class Pair:
     def line(self) -> tuple[str, ...]:
         """The entries of HEADER."""
         cold, warm = self.cold, self.warm
-        ratio = cold["solve_seconds_median"] / warm["solve_seconds_median"]
-        useful = all(r["outcome"] in ("optimal", "feasible") for r in (cold, warm))
+        ratio = cold["time"] / warm["time"]
+        useful = all(r["ending"] in COUNT for r in (cold, warm))
         iterations = [_number(r["iterations_mean"]) for r in (cold, warm)]
         scene = (f"{cold['scenario']} {cold['mesh']}", cold["apart"], cold["mode"])
         return (
@@ -37,17 +41,17 @@ class Pair:
             cold["bound"],
             str(cold["solver"]),
             f"{ratio:.2f}" if useful and ratio > 0 else self._outcomes(),
-            " → ".join(iterations),
-            " → ".join(distance_text(r) for r in (cold, warm)),
+            *iterations,
+            *(distance_of(r) for r in (cold, warm)),
         )
 
     def _outcomes(self) -> str:
         """What there is instead of a ratio."""
-        return " → ".join(str(r["outcome"]) for r in (self.cold, self.warm))
+        return " → ".join(str(r["ending"]) for r in (self.cold, self.warm))
 
 
 def _number(value: float) -> str:
-    return "-" if pd.isna(value) else f"{value:.4g}"
+    return "" if pd.isna(value) else f"{value:.4g}"
 
 
 def starts_warm(run: pd.Series) -> bool:
@@ -68,10 +72,3 @@ def table(runs: pd.DataFrame) -> Table:
     """A line a pair."""
     lines = [pair.line() for pair in pairs(runs)]
     return Table("Cold and warm starts", HEADER, lines, Prose(EXPLANATION))
-
-
-def beside_twins(solvers: list[str]) -> list[str]:
-    """Names in their order, each warm twin right after its cold one."""
-    place = {name: k for k, name in enumerate(solvers)}
-    twin = {name: name.removesuffix(SUFFIX) for name in solvers}
-    return sorted(solvers, key=lambda n: (place.get(twin[n], place[n]), n.endswith(SUFFIX)))

@@ -13,7 +13,7 @@ import pytest
 from matplotlib import get_data_path
 
 from strainbench.report import load_runs
-from strainbench.report.charts import Target, draw, work_precision
+from strainbench.report.charts import Chart, Target, draw, work_precision
 from strainbench.report.charts.axes import decades, length_tick, time_tick
 from strainbench.report.charts.text import Box, Name, place, spread, width, wrapped
 from strainbench.report.measures import measured
@@ -118,3 +118,10 @@ def test_ticks_have_units():
     assert [length_tick(10.0**k) for k in (-6, -4, -3, -1, 0, 1, 2)] == [
         *("1 nm", "0.1 µm", "1 µm", "0.1 mm", "1 mm", "1 cm", "10 cm")
     ]
+
+
+def test_control_characters_in_a_name_do_not_end_the_process(tmp_path):
+    mark = {"mark": "text", "data": {"values": [{"name": "a\x00\x1b[31m  b\u202e"}]}}
+    encoding = {"text": {"field": "name", "type": "nominal"}}
+    draw(Chart("c", "", "", {**mark, "encoding": encoding}), tmp_path / "c.svg")
+    assert "a" in words(tmp_path / "c.svg")

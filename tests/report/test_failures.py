@@ -117,7 +117,11 @@ ROWS = [
     (scene_row("weak", EASY, "optimal"), "solved"),
     (scene_row("rough", HARD, "feasible", "...", relative_gap_max=0.05), "solved"),
     (scene_row("rough", EASY, "feasible", "..."), "solved"),
-    (scene_row("lost", HARD, "no answer", "time limit of 9 s (0 of 3 steps)"), None),
+    (
+        scene_row("lost", HARD, "no answer", "time limit of 9 s (0 of 10 steps)")
+        | {"steps_done": 0},
+        None,
+    ),
     (scene_row("lost", EASY, "violated", "..."), "time limit"),
     (scene_row("proud", HARD, "no answer", "unsupported: too thin (0 of 3 steps)"), None),
     (scene_row("alone", HARD, "no answer", "crashed (0 of 3 steps)"), None),
@@ -154,8 +158,8 @@ METHODS, SHARED = (
     [
         (STRESS, "best", "✓", "", ""),
         (STRESS, "weak", "✗", "violated by 3e-3, says iteration limit", f"optimal at {METHODS}"),
-        (STRESS, "rough", "○", "gap 5e-2, 0.009 mm", f"feasible at {SHARED}"),
-        (STRESS, "lost", "✗", "time limit of 9 s", f"violated at {SHARED}"),
+        (STRESS, "rough", "○", "gap 5e-2, 0.0090 mm", f"feasible at {SHARED}"),
+        (STRESS, "lost", "✗", "out of time, 0 of 10", f"violated at {SHARED}"),
         (STRESS, "alone", "✗", "crashed", "not run at severity 0.1"),
         (STRESS, "proud", "✗", "unsupported: too thin", "refused"),
         (TWIST, "best", "✓", "says infeasible", ""),
@@ -186,7 +190,7 @@ def test_the_report_writes_the_table(folder):
     assert folder / "failures.csv" in paths
     text = (folder / "failures.md").read_text()
     assert f"| method | {STRESS} | {TWIST} |" in text
-    assert "| rough | ○ gap 5e-2, 0.009 mm † |  |" in text
+    assert "| rough | ○ gap 5e-2, 0.0090 mm † |  |" in text
     assert f"- weak: violated by 3e-3, says iteration limit; optimal at {METHODS}" in text
 
 

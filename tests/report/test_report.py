@@ -10,22 +10,16 @@ import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.records import MACHINES, RUNS, STEPS, RecordsError, append_rows
+from strainbench.document import Faint
 from strainbench.report import load_runs, write_report
 from strainbench.report.charts import Target, sweep
 from strainbench.report.energy import energies
+from strainbench.report.lines import accuracy_of, ending_text, measures_of
 from strainbench.report.measures import measured
 from strainbench.report.names import digits_of
 from strainbench.report.steps import newest_steps
 from strainbench.report.sweep import beyond, sweeps
-from strainbench.report.table import (
-    accuracy_text,
-    as_markdown,
-    explanation,
-    groups,
-    ledger,
-    mark,
-    time_text,
-)
+from strainbench.report.table import as_markdown, explanation, groups, ledger, mark
 from strainbench.report.warm import pairs
 
 
@@ -84,22 +78,62 @@ def by_solver(folder):
 @pytest.mark.parametrize(
     ("solver", "sign", "text"),
     [
-        ("good", "", "0.0200"),
-        ("loose", "*", "*0.0200"),
-        ("slow", "*", "*0.0200 (4/10)"),
-        ("broken", "-", "-"),
-        ("absent", "-", "-"),
+        ("good", "", "✓ optimal"),
+        ("loose", "*", "✗ violates by 3e-9"),
+        ("slow", "*", "✗ out of time, 4 of 10"),
+        ("broken", "-", "✗ crashed"),
+        ("absent", "-", "✗ not installed"),
     ],
 )
 def test_marks_follow_the_referee(by_solver, solver, sign, text):
     assert mark(by_solver[solver]) == sign
-    assert time_text(by_solver[solver]) == text
+    assert ending_text(by_solver[solver]) == text
 
 
 def test_accuracy_stands_beside_the_time(by_solver):
-    assert accuracy_text(by_solver["good"]) == "3e-9 · 2e-6 · 0.009"
-    assert accuracy_text(by_solver["absent"]) == ""
-    assert accuracy_text(None) == ""
+    assert accuracy_of(by_solver["good"]) == ("3e-9", "2e-6", "0.0090")
+    assert accuracy_of(by_solver["absent"]) == ("", "", "")
+
+
+def test_numbers_that_do_not_count_are_faint_and_those_not_known_absent(by_solver):
+    assert [type(text) for text in measures_of(by_solver["good"])[3:]] == [str] * 4
+    _, *numbers = measures_of(by_solver["loose"])
+    assert {type(text) for text in numbers} == {Faint}
+    assert numbers[2:] == ["20", "3e-9", "2e-6", "0.0090"]
+    assert measures_of(by_solver["absent"]) == ["✗ not installed", *[""] * 6]
+
+
+def test_the_median_is_over_projections_that_had_something_to_do(folder):
+    free = {"cell": ROWS[1]["cell"], "step": 1, "seconds": 1e-4, "active_constraints": 0}
+    busy = [free | {"seconds": s, "active_constraints": 7} for s in (0.011, 0.012, 0.023)]
+    append_rows(folder / STEPS, STEP_COLUMNS, [free, *busy])
+    text = as_markdown(load_runs(folder), {})
+    line = next(line for line in text.splitlines() if "| **good** |" in line)
+    expected = (
+        "| 1% | 10×10 | **good** | ✓ optimal | **12** | 12 to 18 | 20 | 3e-9 | 2e-6 | 0.0090 |"
+    )
+    assert line == expected
+
+
+def test_only_the_fastest_optimal_cell_stands_out_and_the_order_is_outcome_then_time(tmp_path):
+    text = table_of(
+        tmp_path,
+        row("wrong", solve_seconds_median=0.001, outcome="violated"),
+        row("near", solve_seconds_median=0.002, outcome="feasible"),
+        row("second", solve_seconds_median=0.04),
+        row("first", solve_seconds_median=0.03),
+    )
+    lines = [line for line in text.splitlines() if line.startswith("| 1% |")]
+    names = [line.split(" | ")[2] for line in lines]
+    assert names == ["**first**", "second", "near", "wrong"]
+    assert text.count("**") == 2 * 3  # in the explanation too
+    assert "| (1.0) |" in lines[-1]
+
+
+def test_where_nothing_is_optimal_nothing_stands_out(tmp_path):
+    text = table_of(tmp_path, row("near", solve_seconds_median=0.002, outcome="feasible"))
+    assert "| near | ○ within the limits | 2.0 |" in text
+    assert "nan" not in text
 
 
 def test_infeasible_frames_have_no_part_in_the_references_error(folder):
@@ -111,14 +145,10 @@ def test_infeasible_frames_have_no_part_in_the_references_error(folder):
 def test_the_table_has_the_papers_shape(folder):
     (group,) = groups(load_runs(folder))
     assert group.meshes == ["10×10", "20×20"]
-    assert group.implicit_euler()[0] == pytest.approx(0.005)
-    assert [solver for _, solver, _ in group.blocks()] == [
-        "good",
-        "loose",
-        "slow",
-        "broken",
-        "absent",
-    ]
+    assert group.implicit_euler() == {"10×10": pytest.approx(0.005)}
+    coarse, fine = group.blocks()
+    assert list(coarse["solver"]) == ["good", "loose", "slow", "broken", "absent"]
+    assert list(fine["solver"]) == ["good"]
 
 
 def test_every_file_is_written_and_every_failure_shown(folder):
@@ -236,11 +266,11 @@ def test_cold_and_warm_starts_stand_side_by_side(tmp_path):
     append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
     runs = load_runs(tmp_path)
     (pair,) = pairs(runs)
-    expected = ("swing 10×10, simulate", "1%", "good", "1.50", "12 → 5", "1 → 2")
+    expected = ("swing 10×10, simulate", "1%", "good", "1.50", "12", "5", "1.0", "2.0")
     assert pair.line() == expected
     first = next(group for group in groups(runs) if "simulate" in group.title)
-    names = [solver for _, solver, _ in first.blocks()]
-    assert names[:3] == ["other", "good", "good-warm"]
+    (cells,) = first.blocks()
+    assert list(cells["solver"])[-2:] == ["good", "misleading"]  # as fast as each other
     markdown = as_markdown(runs, {})
     assert f"| {' | '.join(expected)} |" in markdown
     assert "Cold and warm" not in as_markdown(runs[runs["solver"] == "other"], {})
@@ -288,16 +318,16 @@ def test_a_mesh_from_a_file_is_called_by_it(tmp_path):
         row("good", scenario_parameters=json.dumps({"path": "of/shirt.obj"}), **about),
         row("skirt", scenario_parameters=json.dumps({"path": "", "resolution": 20}), **about),
     )
-    assert "| shirt.obj, 512 elements [s] |" in text
-    assert "| resolution 20, 512 elements [s] |" in text
+    assert "| shirt.obj, 512 elements |" in text
+    assert "| resolution 20, 512 elements |" in text
     assert "20×20" not in text
 
 
 def test_a_scene_without_limit_or_resolution_stays_in_table_and_ledger(tmp_path):
     bare = {"limit": "", "resolution": "", "variables": 9, "constraints": 8, "nonzeros": 7}
     text = table_of(tmp_path, row("good", **bare), row("better", **bare))
-    assert "|  | good |" in text
-    assert "|  | better |" in text
+    assert "|  | 2 elements | **good** |" in text
+    assert "|  | 2 elements | better |" in text
     assert "| swing |  | 2 elements | 4 | 9 | 8 |  | 7 |" in text
 
 
@@ -315,7 +345,7 @@ def test_a_distance_that_the_reference_does_not_resolve_is_a_bound(tmp_path):
     rows = [row("near", distance_max=2e-6, reference_error_max=3e-6)]
     append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
     (near,) = (r for _, r in load_runs(tmp_path).iterrows())
-    assert accuracy_text(near) == "3e-9 · 2e-6 · <0.005"
+    assert accuracy_of(near) == ("3e-9", "2e-6", "<0.0030")
 
 
 def test_a_line_is_broken_where_a_cell_has_no_answer(tmp_path):

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+from strainbench import escape
+
 
 @dataclass(frozen=True)
 class Chart:
@@ -51,7 +53,9 @@ def draw_sheet(charts: Sequence[Chart], paths: Sequence[Path], columns: int = 3)
 
     if wrong := [path for path in paths if path.suffix not in ENDINGS]:
         raise ValueError(f"{wrong[0]}: a name that ends in {', '.join(ENDINGS)} is valid")
-    found = [vl_convert.vegalite_to_svg(chart.spec, allowed_base_urls=[]) for chart in charts]
+    found = [
+        vl_convert.vegalite_to_svg(_seen(chart.spec), allowed_base_urls=[]) for chart in charts
+    ]
     svg = found[0] if len(found) == 1 else _together(found, columns)
     for path in paths:
         if path.suffix == ".svg":
@@ -60,6 +64,18 @@ def draw_sheet(charts: Sequence[Chart], paths: Sequence[Path], columns: int = 3)
             path.write_bytes(vl_convert.svg_to_pdf(svg))
         else:
             path.write_bytes(vl_convert.svg_to_png(svg, scale=SHARP))
+
+
+def _seen(part: Any) -> Any:
+    """A specification without control characters, which would end the whole process."""
+    match part:
+        case str():
+            return escape.seen(part)
+        case list() | tuple():
+            return [_seen(each) for each in part]
+        case dict():
+            return {_seen(key): _seen(value) for key, value in part.items()}
+    return part
 
 
 def _together(drawn: Sequence[str], columns: int) -> str:
