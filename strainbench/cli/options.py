@@ -118,6 +118,9 @@ Memory = Annotated[
 Jobs = Annotated[int, _whole("--jobs", "cells at a time; with more than one, times are disturbed")]
 Threads = Annotated[int, _whole("--threads", "threads a solver", MOST_THREADS)]
 Repeats = Annotated[int, _whole("--repeats", "turns of each solver on each frame")]
+Timings = Annotated[
+    int, _whole("--repeats", "times that each projection is timed; the first answer counts", 1000)
+]
 Units = Annotated[
     bool,
     typer.Option("--units", help="beside factorisation + solve, and a step of implicit Euler"),

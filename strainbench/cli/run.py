@@ -25,6 +25,7 @@ from strainbench.cli.options import (
     Start,
     StepsOrAll,
     Threads,
+    Timings,
     Tolerances,
 )
 from strainbench.escape import plain
@@ -49,6 +50,7 @@ def run_cells(
     memory_limit: Memory = None,
     jobs: Jobs = 1,
     threads: Threads = 1,
+    repeats: Timings = 1,
     scheduler: Scheduler = None,
     processes: Processes = "fork",
     results: Folder = LOCAL / "run",
@@ -78,6 +80,7 @@ def run_cells(
         duration,
         starts,
         threads,
+        repeats,
     )
     if "cold" not in starts and (cold := never_warm(solvers)):
         say(f"left out, as they cannot start warm: {', '.join(cold)}")
