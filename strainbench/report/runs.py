@@ -1,0 +1,29 @@
+"""The rows of a results folder, as tables and charts take them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from strainbench.bench.columns import WORDS
+from strainbench.bench.records import RecordsError
+from strainbench.report.names import with_names
+from strainbench.report.versions import shown_runs
+
+
+def load_runs(folder: Path) -> pd.DataFrame:
+    """The row of each cell that is shown, numbers as numbers; see `strainbench.report.versions`.
+
+    Raises
+    ------
+    RecordsError
+        If there is nothing to report, or the records are damaged.
+    """
+    rows = shown_runs(folder)
+    if not rows:
+        raise RecordsError(f"{folder} holds no results: `strainbench run ... --results {folder}`")
+    runs = pd.DataFrame(rows)
+    for column in runs.columns.difference([*WORDS, "older"]):
+        runs[column] = pd.to_numeric(runs[column])
+    return with_names(runs)
