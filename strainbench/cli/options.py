@@ -138,6 +138,23 @@ Processes = Annotated[
 ]
 Rerun = Annotated[bool, typer.Option("--rerun", help="run finished cells again")]
 
+# what is asked of records
+Accuracy = Annotated[
+    str, typer.Option("--to", help="accuracy wanted, such as 0.1mm, 1e-4gap or 1e-6violation")
+]
+Budget = Annotated[str, typer.Option("--within", help="time there is, such as 20ms")]
+Per = Annotated[str, typer.Option("--per", help="what the time is for: projection or step")]
+Folders = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--results",
+        parser=path("--results"),
+        metavar="DIR",
+        help="folder of results; more than one where repeated",
+    ),
+]
+Measure = Annotated[bool, typer.Option("--measure", help="measure first what is not there yet")]
+
 # where it goes, and how it looks
 Folder = Annotated[Path, _folder("folder of the results")]
 FramesFolder = Annotated[Path, _folder("folder that keeps the frames")]

@@ -86,11 +86,11 @@ def run_cells(
         say(f"left out, as they cannot start warm: {', '.join(cold)}")
     jobs = min(jobs, len(cells))
     memory = memory_limit or memory_share(jobs)
-    _run(cells, Settings(results, jobs, memory, rerun, processes), scheduler)
+    run_here(cells, Settings(results, jobs, memory, rerun, processes), scheduler)
 
 
-def _run(cells: Sequence[Cell], settings: Settings, scheduler: str | None) -> None:
-    """Run them here, or where a scheduler has workers."""
+def run_here(cells: Sequence[Cell], settings: Settings, scheduler: str | None = None) -> None:
+    """Run cells with a bar of progress, or have them run where a scheduler has workers."""
     from strainbench.bench.runner import Runner
 
     with Display() as display, keeping(lambda: display.kept(len(cells))):
