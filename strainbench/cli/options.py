@@ -155,6 +155,15 @@ Folders = Annotated[
 ]
 Measure = Annotated[bool, typer.Option("--measure", help="measure first what is not there yet")]
 
+FailOn = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fail-on",
+        metavar="WHAT",
+        help="exit with status 1 on: outcome (worse), ratio>1.1 (B slower, its interval too)",
+    ),
+]
+
 # where it goes, and how it looks
 Folder = Annotated[Path, _folder("folder of the results")]
 FramesFolder = Annotated[Path, _folder("folder that keeps the frames")]

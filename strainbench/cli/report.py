@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strainbench.cli.display import console, say
-from strainbench.cli.options import LOCAL, Folder, TableFile
+from strainbench.cli.display import console, errors, say
+from strainbench.cli.options import LOCAL, FailOn, Folder, TableFile
 from strainbench.options import path
+
+if TYPE_CHECKING:
+    from strainbench.report.compare import Comparison
+
+WIDE = 130  # columns for a comparison with all that there is to say
 
 
 def report_results(results: Folder = LOCAL / "run") -> None:
@@ -27,18 +32,37 @@ def compare_results(
     first: Annotated[Path, typer.Argument(parser=path("A"), help="folder of results, A")],
     second: Annotated[Path, typer.Argument(parser=path("B"), help="folder of results, B")],
     output: TableFile = None,
+    fail_on: FailOn = None,
 ) -> None:
-    """Compare two folders of results, cell by cell: ratios of times, changes in outcome."""
-    from strainbench.document.writers import terminal
+    """Compare two folders of results, cell by cell: changes in outcome, ratios of times."""
     from strainbench.report.compare import compare
+    from strainbench.report.gate import Gate
     from strainbench.report.output import write_output
 
+    gates = [Gate.read(word) for word in fail_on or []]
     found = compare(first, second)
     if output is not None:
         write_output(output, found.document(), found.cells())
+    _show(found)
+    if output is not None:
+        say(f"wrote {output}")
+    failures = [line for gate in gates for line in gate.failures(found.matched)]
+    for line in failures:
+        say(f"strainbench: {line}", errors)
+    if failures:
+        raise typer.Exit(1)
+
+
+def _show(found: Comparison) -> None:
+    """What changed first; ratios on narrow terminals without the accuracies beside."""
+    from strainbench.document.writers import terminal
+
     for line in found.head():
         say(line)
-    for table in found.tables():
+    changes, narrow = found.changes(), console.width < WIDE
+    for table in [*([changes] if changes.lines else []), *found.tables(narrow)]:
         console.print(terminal(table))
-    for line in [*found.foot(), *([f"wrote {output}"] if output else [])]:
+    if narrow:
+        say(f"Violations and gaps: -o FILE, or a terminal of {WIDE} columns.")
+    for line in found.foot():
         say(line)
