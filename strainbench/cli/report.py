@@ -14,18 +14,33 @@ from strainbench.options import path
 if TYPE_CHECKING:
     from strainbench.report.compare import Comparison
 
+BENCHMARKS = ".json"
 WIDE = 130  # columns for a comparison with all that there is to say
 
 
 def report_results(results: Folder = LOCAL / "run") -> None:
-    """Write tables (CSV, Markdown, LaTeX), charts and an HTML page from results."""
+    """Write tables (CSV, Markdown, LaTeX), charts and an HTML page from results.
+
+    Of the JSON that pytest-benchmark writes, its tables, which are shown too, and a chart.
+    """
     from strainbench.files import disk_errors
     from strainbench.report import write_report
 
-    with disk_errors(results):
-        paths = write_report(results)
+    with disk_errors(results.parent if results.suffix == BENCHMARKS else results):
+        paths = _perf(results) if results.suffix == BENCHMARKS else write_report(results)
     for written in paths:
         say(f"wrote {written}")
+
+
+def _perf(file: Path) -> list[Path]:
+    """The report of pytest-benchmark's measurements."""
+    from strainbench.document.writers import terminal
+    from strainbench.report.perf import ABOUT, read_perf, tables, write_perf
+
+    for table in tables(read_perf(file)):
+        console.print(terminal(table))
+    say(" ".join(ABOUT.split()))
+    return write_perf(file)
 
 
 def compare_results(
