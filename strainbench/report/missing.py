@@ -13,6 +13,7 @@ from strainbench.bench.plan import from_file
 from strainbench.bench.settings import Choices, is_file
 from strainbench.document import Code
 from strainbench.fields import spelled
+from strainbench.options import shown
 from strainbench.plugins import UnavailableError, nearest, stems
 from strainbench.report.candidate import UNLIMITED
 from strainbench.solver.registry import find_solver
@@ -129,6 +130,6 @@ def _check_known(word: str, known: Sequence[str], runs: pd.DataFrame) -> None:
         folders = ", ".join(runs["folder"].unique())
         held = ", ".join(runs["solver"].unique())
         raise ValueError(
-            f"--solver {word}: neither a solver of ours nor in {folders}, which has "
-            f"{held}{nearest(word, known)}"
+            f"--solver {shown(word)}: neither a solver of ours nor in {folders}; valid are {held}"
+            f"{nearest(word, known)}"
         ) from None
