@@ -69,19 +69,8 @@ def run_cells(
     if steps is not None and duration is not None:
         raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
-    cells = plan(
-        scenarios,
-        solvers,
-        set_ or [],
-        mode,
-        steps,
-        tolerances,
-        time_limit,
-        duration,
-        starts,
-        threads,
-        repeats,
-    )
+    how = (mode, steps, tolerances, time_limit, duration, starts, threads, repeats)
+    cells = plan(scenarios, solvers, set_ or [], *how)
     if "cold" not in starts and (cold := never_warm(solvers)):
         say(f"left out, as they cannot start warm: {', '.join(cold)}")
     jobs = min(jobs, len(cells))

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from strainbench.bench.records import Row
-from strainbench.referee.certificate import OUTCOMES
+from strainbench.report.measures import ENDINGS
 from strainbench.report.names import (
     SPANNED,
     cells,
@@ -131,7 +131,7 @@ class Pair:
     def worse(self) -> bool:
         """Whether the outcome is worse in B, or fewer steps are done."""
         before, after = (
-            (OUTCOMES.index(r["outcome"]), -_number(r["steps_done"])) for r in self.both
+            (ENDINGS.index(r["outcome"]), -_number(r["steps_done"])) for r in self.both
         )
         return after > before
 

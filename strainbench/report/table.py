@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from strainbench.bench.ending import Ending
+from strainbench.bench.load import OTHER_WORK
 from strainbench.document import Column, Document, Items, Part, Picture, Prose, Strong, Table
 from strainbench.document.writers import latex, markdown
 from strainbench.report import warm
@@ -34,6 +35,7 @@ CERTIFIED = """,
 itself certified to within {error:.1g} mm or, for most cells, better: `<` is a bound on a distance
 that is smaller than what its own cell's reference is certified to"""
 OLDER = "Older than what is installed, and to be had anew with `strainbench run ... --rerun`:"
+BESIDE = "Measured beside other work, which kept as many cores busy as `load` says:"
 LOCAL = """
 *Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
 What such an answer is worth stands below: whether it is a local optimum, by the residual of the
@@ -201,6 +203,12 @@ def older(runs: pd.DataFrame) -> list[str]:
     return lines
 
 
+def disturbed(runs: pd.DataFrame) -> list[str]:
+    """A line for each cell that was measured beside other work."""
+    beside = runs[runs["load"] > OTHER_WORK]
+    return [f"{scene(r)}, {r['solver']}: load {r['load']:.1f}" for _, r in beside.iterrows()]
+
+
 def details(runs: pd.DataFrame) -> Document:
     """A line for each cell whose solver tells more of its time, such as a modelling layer's."""
     lines = [
@@ -244,6 +252,7 @@ def as_document(
     parts: list[Part] = [
         Prose(explanation(runs)),
         Items(older(runs), Prose(OLDER)),
+        Items(disturbed(runs), Prose(BESIDE)),
         Document("Charts", pictures),
         *(group.table() for group in groups(runs)),
         *(section(runs) for section in SECTIONS),
