@@ -77,9 +77,10 @@ docs: setup ## the documentation, into results/local/docs/index.html; broken lin
 graph: setup ## the rooms of the code: floors, lines, what imports what, and what does so upwards
 	$(BIN)/python -m tests.imports
 
-perf: setup ## pytest-benchmark on recorded frames; writes results/local/perf.json
+perf: setup ## pytest-benchmark on recorded frames, certificates beside; results/local/perf.md, .svg
 	@mkdir -p $(LOCAL)
-	$(BIN)/python -m pytest tests/perf -o addopts= --benchmark-json=$(LOCAL)/perf.json
+	$(BIN)/python -m pytest tests/perf -o addopts= --benchmark-quiet --benchmark-json=$(LOCAL)/perf.json
+	$(BIN)/strainbench report --results $(LOCAL)/perf.json
 
 report: setup ## tables and charts from results/local/bench again
 	$(BIN)/strainbench report --results $(BENCH)

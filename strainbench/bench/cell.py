@@ -123,6 +123,7 @@ class Cell:
     tolerance : aimed at by the solver
     time_limit : [s] for physics and solver together, or None
     threads : in the solver's BLAS, OpenMP, numba and rayon
+    repeats : times that each projection is timed; the first answer counts
     """
 
     scenario: PluginRef
@@ -132,10 +133,11 @@ class Cell:
     tolerance: float
     time_limit: float | None = None
     threads: int = 1
+    repeats: int = 1
 
     @property
     def key(self) -> str:
-        """A digest of what the cell's numbers depend on; the time limit is not part of it."""
+        """A digest of what the cell's numbers depend on, its time limit and repeats apart."""
         plugins = [self.scenario.identity, self.solver.identity]
         return _digest([*plugins, self.mode, self.steps, self.tolerance, self.threads])
 

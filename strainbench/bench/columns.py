@@ -55,7 +55,11 @@ RUN_COLUMNS = (
     "scenario_source",
     "content",
     "suite",
+    "repeats",
+    "load",
+    "stolen_seconds",
 )
+"""Of `repeats`: `solve_seconds_mean` and `_median` are over the projections' medians."""
 STEP_COLUMNS = (
     "cell",
     "step",
@@ -93,13 +97,18 @@ STEP_COLUMNS = (
     "penetration",
     "equilibrium_residual",
     "equilibrium_distance",
+    "seconds_low",
+    "seconds_high",
+    "seconds_each",
 )
+"""With repeats, `seconds` is their median, low and high their quartiles, each all as measured."""
 
 WORDS = {
     *("cell", "finished_at", "scenario", "integrator", "solver", "mode", "outcome", "reason"),
     "directions",  # a number, or exact
     *("details_mean", "needs", "scenario_parameters", "solver_parameters", "machine"),
     *("status", "details", "newton_converged"),
+    "seconds_each",
     *("problem", "sampled_by", "ending"),
     *("solver_source", "scenario_source", "content", "suite"),
 }
@@ -107,9 +116,11 @@ WORDS = {
 COUNTS = {
     *("step", "projection", "steps_asked", "steps_done"),
     *("projections", "projections_violated", "projections_optimal", "newton_failures"),
-    *("variables", "constraints", "threads"),
+    *("variables", "constraints", "threads", "repeats"),
 }
 """Numbers that the suite itself counts."""
+SEVERAL = {"seconds_each"}
+"""Words that are numbers with spaces between."""
 SETTINGS = {"scenario_parameters", "solver_parameters", "details_mean", "details"}
 """Words that are JSON."""
 PROSE = {"reason", "status", "ending"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 
-from strainbench.bench.columns import COUNTS, SETTINGS, WORDS
+from strainbench.bench.columns import COUNTS, SETTINGS, SEVERAL, WORDS
 
 SCHEMA = 2
 FIRST = 4  # columns that every header has had
@@ -64,6 +64,8 @@ def _valid(name: str, text: str) -> str | None:
     """What would be valid in a column, or None where `text` is."""
     if name in COUNTS:
         return None if text.isdecimal() and text.isascii() else "a whole number from 0 on"
+    if name in SEVERAL:
+        return None if all(map(_is_number, text.split(" "))) else "numbers with spaces between"
     if name in SETTINGS:
         return None if _is_object(text) else "a JSON object"
     return None if name in WORDS or _is_number(text) else "a number"

@@ -14,6 +14,7 @@ import psutil
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import EVENTS, GO, read_journal
+from strainbench.bench.load import Meter
 from strainbench.bench.play import Task, play_cell
 from strainbench.bench.process import Child, Family, Starter, spawned
 
@@ -36,6 +37,7 @@ class Running:
     seen : for each event when it was not there yet, and when it was, by the clock here [s]
     released : when its clock was allowed to start, or None
     ending : once ended, why it was ended from outside, or ""
+    meter : of what else the machine does while the cell's clock runs
     """
 
     cell: Cell
@@ -48,6 +50,7 @@ class Running:
     steps: int = 0
     released: float | None = None
     ending: str = ""
+    meter: Meter = field(default_factory=Meter)
     _size: int = 0
     _looked: float = 0.0
     _counted: float = 0.0
@@ -72,12 +75,14 @@ class Running:
         """Whether it is over, and with it all that it started; stops it if it is over a limit."""
         code = self.child.exit_code  # before the events are read: none comes after
         self._read_events()
+        if self.released is not None:
+            self.meter.look(self.child.process.pid)
         said_all = self._seen("ended")
         if code is None and not self.ending:
             if said_all is None:
                 self.ending = self._limit_reached()
             lingers = said_all is not None and time.monotonic() - said_all > EXIT_GRACE
-            if not self.ending and not lingers:
+            if not self.ending and not lingers and not self._repeats_over():
                 return False
         elif said_all is None and code is not None:
             self.ending = self.ending or crashed(code)
@@ -95,6 +100,7 @@ class Running:
         with suppress(FileNotFoundError):  # a plug-in has removed the folder: seen in a moment
             (self.folder / GO).touch()
         self.released = time.monotonic()
+        self.meter.look(self.child.process.pid)
 
     def start_seconds(self) -> float:
         """Process start, imports, compilation."""
@@ -134,7 +140,8 @@ class Running:
         limit, now = self.cell.time_limit, time.monotonic()
         warming = self._seen("warming")
         if self.released is not None:
-            if limit is not None and now - self.released > limit + GRACE:
+            begun_again = self._seen("repeating") is not None
+            if limit is not None and not begun_again and now - self.released > limit + GRACE:
                 return f"{Ending.TIME_LIMIT} of {limit:g} s"
         elif self._when("ready") is not None:
             pass  # it waits for us
@@ -149,6 +156,13 @@ class Running:
                     f"{Ending.HUNG} for {longest:g} s in its warm-up, before its first projection"
                 )
         return self._memory_reached(now)
+
+    def _repeats_over(self) -> bool:
+        """Whether its repeats take longer than they may: all that is judged is there by then."""
+        begun, limit = self._seen("repeating"), self.cell.time_limit
+        if begun is None or limit is None:
+            return False
+        return time.monotonic() - begun > (self.cell.repeats - 1) * (limit + GRACE)
 
     def _compile_seconds(self, now: float) -> float:
         begun = [e["at"] for e in self.events if e["event"] == "compiling"]

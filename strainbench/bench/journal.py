@@ -46,6 +46,8 @@ FACTS: dict[str, dict[str, type | tuple[type, ...]]] = {
         "details": dict,
     },
     "step": {"step": int, **{f.name: NUMBER for f in fields(StepReport)}},
+    "repeating": {"peak_memory_mb": NUMBER},
+    "again": {"projection": int, "begin": NUMBER, "end": NUMBER, "seconds": NUMBER},
     "iterate": {"tolerance": NUMBER, "seconds": NUMBER, "iterations": int, "status": str},
     "answer": {"tolerance": NUMBER, "seconds": NUMBER, "iterations": int, "status": str},
     "failed": {"reason": str},

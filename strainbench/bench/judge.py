@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import Events, only, read_events, read_frames, read_journal
-from strainbench.bench.rows import GAP, VIOLATION, Verdict, run_row, step_rows
+from strainbench.bench.rows import GAP, VIOLATION, Verdict, run_row, step_rows, times
 from strainbench.referee.certificate import OUTCOMES, Certificate, certify
 from strainbench.referee.reference import Kept, ReferenceSolver
 from strainbench.scenario.scenario import Scenario
@@ -118,12 +119,25 @@ def _in_time(cell: Cell, events: Events) -> Events:
 
 def _false_claim(events: Events) -> str:
     """Whether projections took longer by the journal's clock than they say themselves."""
-    projections = [e for e in only(events, "projection") if "end" in e]
+    timed = [*only(events, "projection"), *only(events, "again")]
+    projections = [e for e in timed if "end" in e]
     said = sum(e["seconds"] for e in projections)
     took = sum(e["end"] - e["begin"] for e in projections)
     if took - said < CLAIM_SLACK + CLAIM_SHARE * took:
         return ""
     return f"{Ending.TAMPERED}: solves of {said:.2f} s by its account took {took:.2f} s"
+
+
+def _missing_repeats(
+    cell: Cell, events: Events, failures: Sequence[str], ending: str
+) -> Iterator[str]:
+    """How often projections were timed where that is less often than was asked for, and why."""
+    if cell.repeats == 1:
+        return
+    fewest = min(map(len, times(events)), default=cell.repeats)
+    if fewest < cell.repeats:
+        cause = ending or next(iter(failures), "their time was over")
+        yield f"{fewest} of {cell.repeats} repeats: {cause}"
 
 
 def _outcome(
@@ -147,6 +161,7 @@ def _outcome(
         if outcome != "optimal":
             found = max(worst, key=_badness).reason
             reasons.append(f"{len(worst)} of {len(certificates)} projections: {found} at worst")
+        reasons += _missing_repeats(cell, events, failures, ending)
     unconverged = sum(not e["newton_converged"] for e in only(events, "step"))
     if unconverged:
         reasons.append(f"Newton did not converge on {unconverged} steps")

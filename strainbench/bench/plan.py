@@ -168,6 +168,7 @@ def plan(
     duration: float | None = None,
     starts: Sequence[str] = ("cold",),
     threads: int = 1,
+    repeats: int = 1,
 ) -> list[Cell]:
     """All cells of a run; each scene has its own number of steps with a `duration` [s], and where
     neither that nor `steps` is given.
@@ -182,7 +183,8 @@ def plan(
         One line that names the wrong word and what is valid.
     """
     _check_words(mode, starts)
-    _check_numbers({"--steps": [steps], "--threads": [threads]}, "a whole number")
+    for name, count in (("--steps", steps), ("--threads", threads), ("--repeats", repeats)):
+        _check_numbers({name: [count]}, "a whole number")
     times = {"--time-limit": [time_limit], "--duration": [duration]}
     _check_numbers({"--tolerance": tolerances, **times}, "a number")
     choices = parse_settings(settings)
@@ -196,7 +198,7 @@ def plan(
         for scene in scenes
     ]
     cells = [
-        Cell(scene, method, mode, count, tolerance, time_limit, threads)
+        Cell(scene, method, mode, count, tolerance, time_limit, threads, repeats)
         for (scene, count), method, tolerance in product(counted, methods, tolerances)
     ]
     return list({cell.key: cell for cell in cells}.values())

@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_info
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
-from strainbench.bench.journal import GO, Journal, read_events, read_targets
+from strainbench.bench.journal import GO, Journal, only, read_events, read_frames, read_targets
 from strainbench.bench.nursery import untouched_mb
 from strainbench.physics.integrators import Project
 from strainbench.plugins import told
@@ -40,7 +40,13 @@ Task = Callable[[Cell, Path, Path | None], None]
 
 def play_cell(cell: Cell, folder: Path, recording: Path | None) -> None:
     """Run `cell`, writing to `folder`; `recording` holds the frames to replay."""
-    with_journal(folder, lambda journal: _play(cell, folder, journal, recording))
+
+    def work(journal: Journal) -> None:
+        _play(cell, folder, journal, recording)
+        if cell.repeats > 1:
+            _repeat(cell, folder, journal)
+
+    with_journal(folder, work)
 
 
 def with_journal(folder: Path, work: Callable[[Journal], None]) -> None:
@@ -81,6 +87,29 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
         journal.write("step", step=stage.step, **vars(report))
         if stage.step < cell.steps:
             timer.check()
+
+
+def _repeat(cell: Cell, folder: Path, journal: Journal) -> None:
+    """Project the candidates again, for the seconds alone, once all steps are done."""
+    journal.write("repeating", peak_memory_mb=_peak_memory_mb() + untouched_mb())
+    count = len(only(read_events(folder), "projection"))
+    for _ in range(1, cell.repeats):
+        _round(cell, folder, count, journal)
+
+
+def _round(cell: Cell, folder: Path, count: int, journal: Journal) -> None:
+    """All candidates in their order, by a solver that is loaded and prepared anew.
+
+    Whatever it keeps from frame to frame is before each what it was the first time.
+    """
+    stage = Stage(cell.scenario.scenario(), cell.solver.solver(), cell.tolerance, journal.clock)
+    timer = _Timer(cell.time_limit, journal.clock)
+    stage.set_up()
+    for number, (target, _) in enumerate(read_frames(folder, count), start=1):
+        timer.check()
+        again = stage.solve(target, timer.remaining())
+        facts = {"begin": again.begin, "end": again.end, "seconds": again.solution.seconds}
+        journal.write("again", projection=number, **facts)
 
 
 def _what_is_loaded(stage: Stage) -> dict[str, object]:
@@ -136,7 +165,7 @@ def wait_for_go(folder: Path, journal: Journal) -> None:
 
 def replay(recording: Path, project: Project) -> Iterator[StepReport]:
     """Project the candidates of a recorded run, step by step, whatever became of them."""
-    events = [e for e in read_events(recording) if e["event"] == "projection"]
+    events = only(read_events(recording), "projection")
     targets = read_targets(recording, len(events))
     for _, projections in groupby(zip(events, targets, strict=True), key=lambda p: p[0]["step"]):
         for _, target in projections:

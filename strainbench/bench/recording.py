@@ -20,7 +20,8 @@ from strainbench.solver.registry import find_solver
 def recorder(cell: Cell) -> Cell:
     """The same scene with the reference solver, which records what others are fed."""
     reference = PluginRef.of(find_solver(REFERENCE_SOLVER))
-    return replace(cell, solver=reference, mode="simulate", tolerance=1e-6, time_limit=None)
+    played = replace(cell, solver=reference, mode="simulate", tolerance=1e-6)
+    return replace(played, time_limit=None, repeats=1)
 
 
 class _Reached(Exception):  # noqa: N818

@@ -61,6 +61,7 @@ def identity(cell: Cell) -> dict[str, object]:
         "scenario_source": cell.scenario.source,
         "content": f"{cell.scenario.content} {cell.solver.content}",
         "suite": suite_digest(),
+        "repeats": cell.repeats,
     }
 
 
@@ -69,12 +70,29 @@ def step_rows(
 ) -> list[dict[str, object]]:
     """A row a projection, with the fields of its certificate."""
     steps = {e["step"]: e for e in only(events, "step")}
-    projections = zip(only(events, "projection"), verdicts, strict=True)
+    projections = zip(only(events, "projection"), times(events), verdicts, strict=True)
     return [
         _step_row(event, found, steps.get(event["step"], {}))
-        | {"cell": cell.key, "projection": number}
-        for number, (event, found) in enumerate(projections, start=1)
+        | {"cell": cell.key, "projection": number, **_seconds(each)}
+        for number, (event, each, found) in enumerate(projections, start=1)
     ]
+
+
+def times(events: Events) -> list[list[float]]:
+    """Seconds of each projection: of the answer that counts, then of its repeats."""
+    each = [[float(e["seconds"])] for e in only(events, "projection")]
+    for again in only(events, "again"):
+        each[again["projection"] - 1].append(float(again["seconds"]))
+    return each
+
+
+def _seconds(each: list[float]) -> dict[str, object]:
+    """The median, and of several the quartiles and all as they are."""
+    if len(each) == 1:
+        return {"seconds": each[0]}
+    low, median, high = map(float, np.quantile(each, [0.25, 0.5, 0.75]))
+    every = " ".join(map(repr, each))
+    return {"seconds": median, "seconds_low": low, "seconds_high": high, "seconds_each": every}
 
 
 def _step_row(
@@ -82,7 +100,7 @@ def _step_row(
 ) -> dict[str, object]:
     details = event["details"] | {k: v for k, v in found.items() if k in LOCAL and v == v}
     return {
-        **{k: event[k] for k in ("step", "status", "seconds", "iterations")},
+        **{k: event[k] for k in ("step", "status", "iterations")},
         **{k: v for k, v in found.items() if k not in ("reason", *LOCAL)},
         **{k: physics.get(k, "") for k in PHYSICS},
         "details": json.dumps(details) if details else "",
@@ -101,9 +119,11 @@ def _measured(cell: Cell, events: Events, ending: str) -> dict[str, object]:
     """What its process says of itself."""
     last = {e["event"]: e for e in events}
     steps, projections = only(events, "step"), only(events, "projection")
-    seconds = [e["seconds"] for e in projections] + cut_off(cell, events, ending)
+    each, last_one = times(events), cut_off(cell, events, ending)
+    seconds = [float(np.median(taken)) for taken in each] + last_one
     euler = [e["ie_seconds"] for e in steps]
     loaded = last.get("loaded", {})
+    played = last.get("repeating", last.get("ended", {}))
     return {
         "steps_done": len(steps),
         "projections": len(projections),
@@ -111,11 +131,11 @@ def _measured(cell: Cell, events: Events, ending: str) -> dict[str, object]:
         "solve_seconds_median": _of(np.median, seconds),
         "setup_seconds": last.get("setup", {}).get("seconds", ""),
         "ie_seconds_mean": _of(np.mean, euler if cell.mode == "simulate" else []),
-        "play_seconds": sum(seconds) + sum(euler),
+        "play_seconds": sum(taken[0] for taken in each) + sum(last_one) + sum(euler),
         "iterations_mean": _of(np.mean, [e["iterations"] for e in projections]),
         "details_mean": _mean_details([e["details"] for e in projections]),
         "newton_failures": sum(not e["newton_converged"] for e in steps),
-        "peak_memory_mb": last.get("ended", {}).get("peak_memory_mb", ""),
+        "peak_memory_mb": played.get("peak_memory_mb", ""),
         **{name: loaded.get(name, "") for name in LOADED},
     }
 

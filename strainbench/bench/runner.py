@@ -107,11 +107,11 @@ class Runner:
     def is_finished(self, cell: Cell) -> bool:
         """Whether a row makes running `cell` needless.
 
-        It does not if the solver or a worker was unavailable or if the cell was stopped at a time
-        limit below the one given now.
+        It does not if the solver or a worker was unavailable, if the cell was stopped at a time
+        limit below the one given now, or if its projections were to be repeated less often.
         """
         row = self._finished.get(cell.key)
-        if row is None or self.settings.rerun:
+        if row is None or self.settings.rerun or int(row["repeats"] or 1) < cell.repeats:
             return False
         ending = Ending.of(row["reason"])
         if ending is Ending.TIME_LIMIT:
@@ -216,7 +216,7 @@ class Runner:
         self, item: Running, row: dict[str, object], steps: list[dict[str, object]]
     ) -> None:
         """Write down what the referee found of a cell, or why it found nothing."""
-        row["start_seconds"] = item.start_seconds()
+        row |= {"start_seconds": item.start_seconds(), **item.meter.columns()}
         self.summary.judging += float(str(row.get("judge_seconds", 0.0)))
         self.write(item.cell, row, steps)
         shutil.rmtree(item.folder, ignore_errors=True)

@@ -16,6 +16,7 @@ from typing import Annotated, TextIO
 import typer
 
 from strainbench import __version__
+from strainbench.cli.advice import recommend
 from strainbench.cli.display import console, errors, say
 from strainbench.cli.interrupt import (
     INTERRUPTED,
@@ -75,6 +76,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "run": run_cells,
     "report": report_results,
     "compare": compare_results,
+    "recommend": recommend,
     "converge": follow_solvers,
     "duel": let_duel,
     "export": export_frame,

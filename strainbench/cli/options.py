@@ -118,6 +118,9 @@ Memory = Annotated[
 Jobs = Annotated[int, _whole("--jobs", "cells at a time; with more than one, times are disturbed")]
 Threads = Annotated[int, _whole("--threads", "threads a solver", MOST_THREADS)]
 Repeats = Annotated[int, _whole("--repeats", "turns of each solver on each frame")]
+Timings = Annotated[
+    int, _whole("--repeats", "times that each projection is timed; the first answer counts", 1000)
+]
 Units = Annotated[
     bool,
     typer.Option("--units", help="beside factorisation + solve, and a step of implicit Euler"),
@@ -147,6 +150,32 @@ Columns = Annotated[
     str | None,
     typer.Option(
         "--columns", help="of the paper's tables, of seconds,mean,violation,gap,mm [seconds,mm]"
+    ),
+]
+
+# what is asked of records
+Accuracy = Annotated[
+    str, typer.Option("--to", help="accuracy wanted, such as 0.1mm, 1e-4gap or 1e-6violation")
+]
+Budget = Annotated[str, typer.Option("--within", help="time there is, such as 20ms")]
+Per = Annotated[str, typer.Option("--per", help="what the time is for: projection or step")]
+Folders = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--results",
+        parser=path("--results"),
+        metavar="DIR",
+        help="folder of results; more than one where repeated",
+    ),
+]
+Measure = Annotated[bool, typer.Option("--measure", help="measure first what is not there yet")]
+
+FailOn = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--fail-on",
+        metavar="WHAT",
+        help="exit with status 1 on: outcome (worse), ratio>1.1 (B slower, its interval too)",
     ),
 ]
 

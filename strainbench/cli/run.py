@@ -25,6 +25,7 @@ from strainbench.cli.options import (
     Start,
     StepsOrAll,
     Threads,
+    Timings,
     Tolerances,
 )
 from strainbench.escape import plain
@@ -49,6 +50,7 @@ def run_cells(
     memory_limit: Memory = None,
     jobs: Jobs = 1,
     threads: Threads = 1,
+    repeats: Timings = 1,
     scheduler: Scheduler = None,
     processes: Processes = "fork",
     results: Folder = LOCAL / "run",
@@ -64,27 +66,17 @@ def run_cells(
     if steps is not None and duration is not None:
         raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
-    cells = plan(
-        scenarios,
-        solvers,
-        set_ or [],
-        mode,
-        steps,
-        tolerances,
-        time_limit,
-        duration,
-        starts,
-        threads,
-    )
+    how = (mode, steps, tolerances, time_limit, duration, starts, threads, repeats)
+    cells = plan(scenarios, solvers, set_ or [], *how)
     if "cold" not in starts and (cold := never_warm(solvers)):
         say(f"left out, as they cannot start warm: {', '.join(cold)}")
     jobs = min(jobs, len(cells))
     memory = memory_limit or memory_share(jobs)
-    _run(cells, Settings(results, jobs, memory, rerun, processes), scheduler)
+    run_here(cells, Settings(results, jobs, memory, rerun, processes), scheduler)
 
 
-def _run(cells: Sequence[Cell], settings: Settings, scheduler: str | None) -> None:
-    """Run them here, or where a scheduler has workers."""
+def run_here(cells: Sequence[Cell], settings: Settings, scheduler: str | None = None) -> None:
+    """Run cells with a bar of progress, or have them run where a scheduler has workers."""
     from strainbench.bench.runner import Runner
 
     with Display() as display, keeping(lambda: display.kept(len(cells))):

@@ -1,69 +1,19 @@
 """Tables and charts from a results folder."""
 
-from __future__ import annotations
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-from pathlib import Path
+if TYPE_CHECKING:
+    from strainbench.report.runs import load_runs
+    from strainbench.report.written import write_report
 
-import pandas as pd
-
-from strainbench.bench.columns import WORDS
-from strainbench.bench.records import RecordsError, read_machines
-from strainbench.document import Document, Prose, Table
-from strainbench.document.page import page
-from strainbench.document.writers import csv, markdown
-from strainbench.report.charts import draw_charts
-from strainbench.report.energy import energy_table
-from strainbench.report.failures import failures, failures_document
-from strainbench.report.measures import measured
-from strainbench.report.names import with_names
-from strainbench.report.paper import as_latex, chosen_methods
-from strainbench.report.steps import newest_steps
-from strainbench.report.sweep import BEYOND, sweep_tables
-from strainbench.report.table import as_document, as_markdown, tidy
-from strainbench.report.versions import shown_runs
+__all__ = ["load_runs", "write_report"]
+_HOMES = {"load_runs": "runs", "write_report": "written"}
 
 
-def load_runs(folder: Path) -> pd.DataFrame:
-    """The row of each cell that is shown, numbers as numbers, with what it comes to.
-
-    See `strainbench.report.versions`, `names` and `measures`.
-
-    Raises
-    ------
-    RecordsError
-        If there is nothing to report, or the records are damaged.
-    """
-    rows = shown_runs(folder)
-    if not rows:
-        raise RecordsError(f"{folder} holds no results: `strainbench run ... --results {folder}`")
-    runs = pd.DataFrame(rows)
-    for column in runs.columns.difference([*WORDS, "older"]):
-        runs[column] = pd.to_numeric(runs[column])
-    named = with_names(runs)
-    return measured(named, newest_steps(folder, named))
-
-
-def write_report(folder: Path) -> list[Path]:
-    """Write table1.csv, .md, .tex, what else there is to tell, the charts and index.html."""
-    runs = load_runs(folder)
-    machines = read_machines(folder)
-    steps = newest_steps(folder, runs)
-    charts = draw_charts(folder, runs, steps)
-    drawings = [path for path in charts if path.suffix == ".svg"]
-    texts = {
-        "table1.csv": csv(Table.of(tidy(runs))),
-        "table1.md": as_markdown(runs, machines),
-        "table1.tex": as_latex(chosen_methods(runs, None)),
-        "index.html": page(as_document(runs, machines, "strainbench results", drawings)),
-    }
-    if swept := sweep_tables(runs):
-        texts["sweeps.md"] = markdown(Document("Sweeps", [Prose(BEYOND), *swept]))
-    failed = failures(folder, runs)
-    if len(failed):
-        texts["failures.csv"] = csv(Table.of(failed))
-        texts["failures.md"] = markdown(failures_document(failed, runs, machines))
-    if (energy := energy_table(folder, runs)).lines:
-        texts["energy.md"] = markdown(energy)
-    for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
-    return [*(folder / name for name in texts), *charts]
+def __getattr__(name: str) -> object:
+    """Import what is offered when it is asked for: `strainbench recommend` asks for no chart."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    return globals()[name]

@@ -4,26 +4,39 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from strainbench.bench.records import RecordsError, Row
+from strainbench.bench.load import OTHER_WORK
+from strainbench.bench.records import RecordsError, Row, latest_steps
 from strainbench.document import Column, Document, Items, Part, Table
 from strainbench.report.names import cells, digits
 from strainbench.report.pair import SAME, Pair
+from strainbench.report.spread import FEWEST, SHARE, interval, repeated
 from strainbench.report.versions import shown_runs
 
 MEASURES = ("outcome", "steps_done", "solve_seconds_mean", "max_violation", "relative_gap_max")
-HEADER = (
-    *("mesh", "limit", Column("method", whole=True), "outcome", Column("A", "s"), Column("B", "s")),
-    *("B/A", "violation", "gap"),
+HEADER: tuple[str | Column, ...] = (
+    *("mesh", "limit", Column("method", whole=True), "outcome", Column("A", "s", whole=True)),
+    *(Column("B", "s", whole=True), Column("B/A", whole=True), "violation", "gap"),
+)
+NARROW = slice(2, 7)
+"""Of the header's columns, those that stand on any terminal; a table a mesh and limit then."""
+INTERVALS = (
+    "Brackets hold the ratio with {share:.0%}, by a bootstrap over repeats; "
+    "{apart} of {known} such intervals leave out 1."
+)
+NO_INTERVALS = (
+    "Without three repeats on both sides nothing is known of a ratio's spread: --repeats 5."
 )
 CSV_HEADER = (
     *SAME,
     *(f"{name}_{side}" for name in MEASURES for side in "ab"),
     "seconds_ratio",
+    "ratio_low",
+    "ratio_high",
     "only_in",
     "note",
 )
@@ -65,6 +78,10 @@ class Comparison:
                 f"{ratios.max():.2f}, over the {len(ratios)} cells finished in both, "
                 "on one machine and as many threads."
             )
+            known = [p.interval for p in self.matched if p.ratio > 0 and p.interval]
+            apart = sum(not low <= 1 <= high for low, high in known)
+            about = INTERVALS.format(share=SHARE, apart=apart, known=len(known))
+            lines.append(about if known else NO_INTERVALS)
         return [*lines, *self._older()]
 
     def _older(self) -> Iterator[str]:
@@ -76,13 +93,31 @@ class Comparison:
     def _sides(self) -> Iterator[list[Row]]:
         yield from (list(rows) for rows in zip(*(p.both for p in self.matched), strict=True))
 
-    def tables(self) -> list[Table]:
-        """The cells in both, those that are alike in a table."""
+    def changes(self) -> Table:
+        """The cells whose outcome is another, the worse ones first."""
+        changed = sorted((p for p in self.matched if p.changed), key=lambda p: not p.worse)
+        header = ("cell", "", "outcome")
+        lines = [[p.title, "worse" if p.worse else "better", p.outcomes] for p in changed]
+        return Table("Another outcome", header, lines)
+
+    def tables(self, narrow: bool = False) -> list[Table]:
+        """The cells in both, those that are alike in a table.
+
+        Parameters
+        ----------
+        narrow : a table for each mesh and limit, without accuracies, for which 80 columns do
+        """
         alike: dict[tuple[str, ...], list[Pair]] = {}
         for pair in self.matched:
-            alike.setdefault(pair.alike, []).append(pair)
+            about = (pair.mesh, pair.limit) if narrow else ()
+            alike.setdefault((*pair.alike, *about), []).append(pair)
+        kept = NARROW if narrow else slice(None)
         return [
-            Table(pairs[0].group, HEADER, [pair.cells() for pair in pairs])
+            Table(
+                pairs[0].about if narrow else pairs[0].group,
+                HEADER[kept],
+                [pair.cells()[kept] for pair in pairs],
+            )
             for pairs in alike.values()
         ]
 
@@ -94,13 +129,23 @@ class Comparison:
                 side = f"only in {'A' if pair.a else 'B'}"
                 about = f"{side}, {pair.group}, {cells(pair.mesh)}, {pair.limit}"
                 alone.setdefault(about, []).append(pair.row["solver"])
-        return [p.note for p in self.matched if p.note] + [
-            f"{about}: {', '.join(solvers)}" for about, solvers in alone.items()
+        return [
+            *(p.note for p in self.matched if p.note),
+            *(f"{about}: {', '.join(solvers)}" for about, solvers in alone.items()),
+            *self._disturbed(),
         ]
+
+    def _disturbed(self) -> Iterator[str]:
+        """Which side was measured beside other work."""
+        for side, rows in (("A", [p.a for p in self.pairs]), ("B", [p.b for p in self.pairs])):
+            loads = [float(row["load"]) for row in rows if row and row["load"]]
+            if busy := [load for load in loads if load > OTHER_WORK]:
+                load = f"load {max(busy):.1f} at most"
+                yield f"{len(busy)} cells of {side} were measured beside other work: {load}"
 
     def document(self) -> Document:
         """All of it."""
-        parts: list[Part] = [*self.head(), *self.tables(), Items(self.foot())]
+        parts: list[Part] = [*self.head(), self.changes(), *self.tables(), Items(self.foot())]
         return Document("Two results folders, cell by cell", parts)
 
     def cells(self) -> Table:
@@ -116,6 +161,7 @@ def _line(pair: Pair) -> list[object]:
         *(pair.row[name] for name in SAME),
         *(row[name] if row else "" for name in MEASURES for row in sides),
         pair.ratio if pair.ratio > 0 else "",
+        *(pair.interval or ("", "")),
         alone,
         pair.note,
     ]
@@ -138,4 +184,19 @@ def compare(first: Path, second: Path) -> Comparison:
     a, b = sides
     precision = digits(row["scenario_parameters"] for side in sides for row in side.values())
     pairs = [Pair(a.get(key), b.get(key), precision) for key in dict.fromkeys([*a, *b])]
-    return Comparison((str(first), str(second)), pairs)
+    return Comparison((str(first), str(second)), _with_intervals(pairs, first, second))
+
+
+def _with_intervals(pairs: Sequence[Pair], first: Path, second: Path) -> list[Pair]:
+    """The same, with what is known of each ratio's spread."""
+    if not any(p.comparable and all(int(r["repeats"]) >= FEWEST for r in p.both) for p in pairs):
+        return list(pairs)
+    before, after = (repeated(latest_steps(folder)) for folder in (first, second))
+    found = []
+    for pair in pairs:
+        if pair.comparable:
+            a, b = pair.both
+            sure = interval(before.get(a["cell"], ()), after.get(b["cell"], ()))
+            pair = replace(pair, interval=sure)
+        found.append(pair)
+    return found

@@ -83,8 +83,17 @@ def projections(steps: pd.DataFrame) -> pd.DataFrame:
 
 
 def timing(steps: pd.DataFrame) -> Quartiles:
-    """Seconds a projection, over those that had something to do."""
-    return Quartiles.of(projections(steps)["seconds"])
+    """Seconds a projection, over those that had something to do, all repeats of each."""
+    return Quartiles.of(s for each in every_time(projections(steps)) for s in each)
+
+
+def every_time(steps: pd.DataFrame) -> list[list[float]]:
+    """For each projection all its seconds: one, or as many as it was repeated."""
+    given = steps.reindex(columns=["seconds", "seconds_each"], fill_value="")
+    return [
+        [float(word) for word in each.split()] if each else [float(once)]
+        for once, each in given.itertuples(index=False)
+    ]
 
 
 def by_clock(status: str) -> bool:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from strainbench.bench.records import Row
-from strainbench.report.measures import seconds_text
+from strainbench.report.measures import ENDINGS, seconds_text
 from strainbench.report.names import (
     SPANNED,
     cells,
@@ -42,11 +42,13 @@ class Pair:
     Parameters
     ----------
     digits : that tell the values of each setting apart
+    interval : in which the ratio lies with 95%, None where repeats are too few to say
     """
 
     a: Row | None
     b: Row | None
     digits: Mapping[str, int] = field(default_factory=dict)
+    interval: tuple[float, float] | None = None
 
     @property
     def row(self) -> Row:
@@ -89,6 +91,11 @@ class Pair:
         return f"{cells(self.mesh)}, {self.limit}, {self.row['solver']} ({self.group})"
 
     @property
+    def about(self) -> str:
+        """What cells that differ in their method alone have in common."""
+        return f"{cells(self.mesh)}, {self.limit}, {self.group}"
+
+    @property
     def comparable(self) -> bool:
         """Whether times compare: a solver's, both with all steps, on one machine, threads alike."""
         if not (self.a and self.b) or self.row["solver"] == UNCONSTRAINED:
@@ -110,6 +117,43 @@ class Pair:
             return float("nan")
         before, after = (_number(r["solve_seconds_mean"]) for r in self.both)
         return after / before if before > 0 else float("nan")
+
+    def surely_above(self, most: float) -> bool:
+        """Whether the ratio is larger, and with it all of its interval, where it has one."""
+        return self.ratio > most and (self.interval is None or self.interval[0] > most)
+
+    @property
+    def changed(self) -> bool:
+        """Whether the outcome is another, or as many steps are not done."""
+        return len({(r["outcome"], r["steps_done"]) for r in self.both}) > 1
+
+    @property
+    def worse(self) -> bool:
+        """Whether the outcome is worse in B, or fewer steps are done."""
+        before, after = (
+            (ENDINGS.index(r["outcome"]), -_number(r["steps_done"])) for r in self.both
+        )
+        return after > before
+
+    @property
+    def outcomes(self) -> str:
+        """The outcome, "before → after" where it changed."""
+        return self._change(_outcome)
+
+    @property
+    def verdict(self) -> str:
+        """Outcome and ratio in words."""
+        return ", ".join(filter(None, (self.outcomes, self.ratio_text)))
+
+    @property
+    def ratio_text(self) -> str:
+        """The ratio, with its interval if it is known; nothing where times do not compare."""
+        if not self.ratio > 0:
+            return ""
+        if self.interval is None:
+            return f"{self.ratio:.2f}"
+        low, high = self.interval
+        return f"{self.ratio:.2f} ({low:.2f}-{high:.2f})"
 
     @property
     def both(self) -> tuple[Row, Row]:
@@ -134,9 +178,9 @@ class Pair:
             self.mesh,
             self.limit,
             self.row["solver"],
-            self._change(_outcome),
+            self.outcomes,
             *times,
-            f"{self.ratio:.2f}" if self.ratio > 0 else "",
+            self.ratio_text,
             self._change(lambda r: _power(r["max_violation"])),
             self._change(lambda r: _power(r["relative_gap_max"])),
         )

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from strainbench.bench.load import OTHER_WORK
 from strainbench.document import Column, Document, Items, Part, Picture, Prose, Table
 from strainbench.document.writers import markdown
 from strainbench.report import warm
@@ -46,6 +47,7 @@ TIMES = {
 }
 """Columns of measures, and how table1.csv calls them."""
 OLDER = "Older than what is installed, and to be had anew with `strainbench run ... --rerun`:"
+BESIDE = "Measured beside other work, which kept as many cores busy as `load` says:"
 LOCAL = """
 *Local*: lower bounds on stretch make the problem nonconvex, and nothing is known of its optimum.
 What such an answer is worth stands below: whether it is a local optimum, by the residual of the
@@ -184,6 +186,12 @@ def older(runs: pd.DataFrame) -> list[str]:
     return lines
 
 
+def disturbed(runs: pd.DataFrame) -> list[str]:
+    """A line for each cell that was measured beside other work."""
+    beside = runs[runs["load"] > OTHER_WORK]
+    return [f"{scene(r)}, {r['solver']}: load {r['load']:.1f}" for _, r in beside.iterrows()]
+
+
 def details(runs: pd.DataFrame) -> Document:
     """A line for each cell whose solver tells more of its time, such as a modelling layer's."""
     lines = [
@@ -227,6 +235,7 @@ def as_document(
     parts: list[Part] = [
         Prose(explanation(runs)),
         Items(older(runs), Prose(OLDER)),
+        Items(disturbed(runs), Prose(BESIDE)),
         Document("Charts", pictures),
         *(group.table() for group in groups(runs)),
         *(section(runs) for section in SECTIONS),

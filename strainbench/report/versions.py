@@ -48,6 +48,7 @@ def shown_runs(folder: Path) -> list[Row]:
         row["older"] = row["older"] or older
         threads = machines.get(name, {}).get("threads_per_solver", 1)
         row["threads"] = row["threads"] or str(threads)
+        row["repeats"] = row["repeats"] or "1"
     rows = list(kept.values())
     for name in ("solver", "scenario"):
         _tell_apart(rows, name)

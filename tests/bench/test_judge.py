@@ -20,7 +20,9 @@ def certificate(outcome, violation=0.0, gap=0.0):
 
 
 def judged(certificates, asked=3, done=3, ending="", events=()):
-    return _outcome(SimpleNamespace(steps=asked), list(events), certificates, done, ending)
+    return _outcome(
+        SimpleNamespace(steps=asked, repeats=1), list(events), certificates, done, ending
+    )
 
 
 def test_the_outcome_is_the_worst_of_all_steps():

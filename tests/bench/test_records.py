@@ -19,7 +19,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from strainbench.bench.columns import COUNTS, FACTS, RUN_COLUMNS, SETTINGS, STEP_COLUMNS, WORDS
+from strainbench.bench.columns import (
+    COUNTS,
+    FACTS,
+    RUN_COLUMNS,
+    SETTINGS,
+    SEVERAL,
+    STEP_COLUMNS,
+    WORDS,
+)
 from strainbench.bench.records import (
     LONGEST_TEXT,
     MACHINES,
@@ -75,6 +83,8 @@ def some(column):
     """A value that fits."""
     if column in SETTINGS:
         return json.dumps({"of": column})
+    if column in SEVERAL:
+        return "0.5 1e-3"
     return f"some {column}" if column in WORDS else 3 if column in COUNTS else -0.25
 
 
@@ -313,7 +323,7 @@ def damages(text):
     yield "header twice", r"record 3: the header once more", "".join([header, first, header, *rest])
     yield "open quote", r"record 3 has \d+ fields", "".join([header, first, '1,"b,', *rest])
     name = RUN_COLUMNS[-1]
-    last = text[: text.rindex(f"some {name}")] + f'"some {name}\n'
+    last = text[: text.rindex(",") + 1] + f'"{some(name)}\n'
     yield "open quote at the end", rf"record 4, column {name}: an end of line", last
     for name, wrong, valid in [
         ("schema", "two", f"1 to {SCHEMA} is"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from typer.main import get_command
@@ -16,12 +17,14 @@ from strainbench.cli.options import RECORDER
 from strainbench.referee.reference import REFERENCE_SOLVER
 from tests.command import command
 
+FIELD = Path(__file__).parents[2] / "results/field"
 SOLVER = ["--solver", "none"]
 SMALL = ["--set", "resolution=2"]
 VERBS = {
     "run": ["swing", *SOLVER, *SMALL, "--steps", "1"],
     "report": [],
     "compare": ["a", "b"],
+    "recommend": ["swing", "--to", "1mm", "--within", "1s", *SMALL, "--results", str(FIELD)],
     "render": ["swing", *SOLVER, *SMALL, "--steps", "1"],
     "polar": ["swing", *SOLVER, *SMALL, "--steps", "1"],
     "export": ["swing", *SMALL, "--frame", "1", "-o", "frame.cbf"],
@@ -77,12 +80,16 @@ NONSENSE = {
     "--set": SETTING,
     "--mode": ["", "x", "0", "Replay", "simulate,replay"],
     "--processes": ["", "x", "Fork", "fork,spawn"],
+    "--to": ["", "x", "0.1", "0mm", "-1mm", "nanmm", "1 mile", "20ms"],
+    "--within": ["", "x", "20", "0ms", "-1ms", "infs", "1mm"],
+    "--per": ["", "x", "frame", "Step"],
+    "--fail-on": ["", "x", "ratio", "ratio>", "ratio>x", "ratio>0", "ratio<1"],
     "--start": ["", "x", "cold,", "0"],
     "--format": ["", "x", "0", "png,", "PNG "],
     "--camera": ["", "x", "30", "nan,30", "30,91", "inf,0", "1,2,3"],
     "--scale": ["", "x", "0", "-5%", "nan", "inf", "5", "%"],
 }
-FLAGS = {"--rerun", "--units", "--help"}
+FLAGS = {"--rerun", "--units", "--measure", "--help"}
 
 
 def options():

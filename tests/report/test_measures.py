@@ -14,6 +14,7 @@ from strainbench.report.measures import (
     digits,
     distance_text,
     duration,
+    every_time,
     finish,
     length,
     measured,
@@ -104,3 +105,9 @@ def test_the_committed_field_says_who_ran_out_of_time():
 )
 def test_numbers_have_two_significant_digits(text, expected):
     assert text == expected
+
+
+def test_repeats_count_as_often_as_they_were_measured():
+    rows = steps((1, "optimal", "solved", 0.2, 5)).assign(seconds_each="0.1 0.2 0.4")
+    assert timing(rows)[:3] == pytest.approx((0.2, 0.15, 0.3))
+    assert every_time(rows) == [[0.1, 0.2, 0.4]]

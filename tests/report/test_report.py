@@ -399,3 +399,14 @@ def test_no_ratio_of_a_start_that_failed(tmp_path):
     append_rows(tmp_path / RUNS, RUN_COLUMNS, [failed, row("good-warm", **warm)])
     (pair,) = pairs(load_runs(tmp_path))
     assert pair.line()[3] == "no answer → optimal"
+
+
+def test_cells_measured_beside_other_work_are_marked(tmp_path):
+    rows = [row("calm", load=0.3), row("busy", load=2.13), row("unknown")]
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
+    text = as_markdown(load_runs(tmp_path), {})
+    assert "- swing 10×10 at 1%, busy: load 2.1\n" in text
+    assert text.count(": load") == 1
+    (tmp_path / RUNS).unlink()
+    append_rows(tmp_path / RUNS, RUN_COLUMNS, [row("calm", load=0.3)])
+    assert "beside other work" not in as_markdown(load_runs(tmp_path), {})
