@@ -6,6 +6,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, pi, sin
 
+import numpy as np
+from numpy.typing import NDArray
+
 FONT = "Helvetica Neue, Helvetica, Arial, Liberation Sans, sans-serif"
 WIDTHS = (
     *(278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278),
@@ -134,10 +137,9 @@ def place(
     """
     boxes, placed = list(taken), []
     for name in names:
-        costs = [
-            (_cost(p, name, boxes, plane), k, p) for k, p in enumerate(_places(name, size, mark))
-        ]
-        few = sorted(costs)[:FEW]
+        places = list(_places(name, size, mark))
+        costs = _costs(places, name, boxes, plane)
+        few = [(costs[k], k, places[k]) for k in np.argsort(costs, kind="stable")[:FEW]]
         best = min(few, key=lambda c: c[0] + CROSSED * _crossed(c[2], name, boxes, mark))[2]
         x, y = _nearest(best, name)
         placed.append(Placed(name, best, hypot(x - name.x, y - name.y) > 2.2 * mark + 2))
@@ -164,18 +166,32 @@ def _places(name: Name, size: float, mark: float) -> Iterator[Box]:
             yield Box.around(x, y, half, up)
 
 
-def _cost(box: Box, name: Name, taken: Sequence[Box], plane: Box) -> float:
+def _costs(
+    places: Sequence[Box], name: Name, taken: Sequence[Box], plane: Box
+) -> NDArray[np.float64]:
     """Covering anything costs more than any distance; sticking out still more."""
-    covered = sum(box.shared(other) for other in taken)
-    x, y = _nearest(box, name)
-    return 100 * covered + 1000 * box.beyond(plane) + hypot(x - name.x, y - name.y)
+    covered = _shared(places, taken).sum(axis=1)
+    areas = [(box.right - box.left) * (box.bottom - box.top) for box in places]
+    outside = areas - _shared(places, [plane])[:, 0]
+    nearest = np.array([_nearest(box, name) for box in places])
+    away = np.hypot(*(nearest - (name.x, name.y)).T)
+    return np.asarray(100 * covered + 1000 * outside + away)
+
+
+def _shared(some: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float64]:
+    """The areas (a, b) that boxes of the one and the other cover both."""
+    a = np.array([(box.left, box.top, box.right, box.bottom) for box in some]).reshape(-1, 1, 4)
+    b = np.array([(box.left, box.top, box.right, box.bottom) for box in others]).reshape(1, -1, 4)
+    across = np.minimum(a[..., 2], b[..., 2]) - np.maximum(a[..., 0], b[..., 0])
+    down = np.minimum(a[..., 3], b[..., 3]) - np.maximum(a[..., 1], b[..., 1])
+    return np.asarray(np.maximum(across, 0.0) * np.maximum(down, 0.0))
 
 
 def _crossed(box: Box, name: Name, taken: Sequence[Box], mark: float) -> int:
     """How many points of a leader, beyond its own mark, are taken."""
     steps = along(name.x, name.y, *_nearest(box, name))
     away = [s for s in steps if abs(s.left - name.x) + abs(s.top - name.y) > 2 * mark]
-    return sum(any(step.shared(other) for other in taken) for step in away)
+    return int((_shared(away, taken) > 0).any(axis=1).sum())
 
 
 def _nearest(box: Box, name: Name) -> tuple[float, float]:

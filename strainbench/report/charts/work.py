@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -11,7 +11,7 @@ import pandas as pd
 
 from strainbench.report.charts.axes import Axis, decades, length_tick, power_tick, time_axis
 from strainbench.report.charts.bands import QUESTION, name_band, question, unknown_band
-from strainbench.report.charts.canvas import Plane, about, raw
+from strainbench.report.charts.canvas import SOFT, Plane, about, raw
 from strainbench.report.charts.chart import Chart
 from strainbench.report.charts.rail import draw_rail, rail_height, why_failed
 from strainbench.report.charts.target import Target
@@ -139,7 +139,13 @@ class Panel:
 
     def chart(self, name: str, figure: str, rail: float) -> Chart:
         """All of it."""
-        plane = Plane(self.target, self.title, self.x, self.y, rail=rail)
+        empty = self.counted.empty
+        y = replace(self.y, title="", ticks={}) if empty else self.y
+        height = 3 * self.target.sizes.text if empty else 0.0
+        plane = Plane(self.target, self.title, self.x, y, rail=rail, height=height)
+        if empty:
+            middle = {"px": plane.width / 2, "py": height / 2, "ink": SOFT}
+            plane.texts([middle | {"text": "no method has an answer that counts"}], "center")
         if self.target.interactive:
             question(plane)
         band = unknown_band(plane, self.runs) if self.accuracy.scale != 1.0 else 0.0
