@@ -7,7 +7,7 @@ import numpy as np
 from solvers.newton_ipm.exact import ExactCones
 from solvers.newton_ipm.mesh import Change
 from solvers.newton_ipm.sampled import SampledCones
-from strainbench import Problem
+from strainbench import Problem, section
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import best_linear_solver
 from strainbench.physics.pattern import Pattern
@@ -113,10 +113,12 @@ class Iterate:
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
         cones, pattern = self.cones, self.state.pattern
-        data = np.zeros(len(pattern.indices))
-        pattern.add_diagonal(data, self.problem.weights)
-        total = cones.assemble(data)
-        self.state.linear.factorise(data)  # 3
+        with section("assemble"):
+            data = np.zeros(len(pattern.indices))
+            pattern.add_diagonal(data, self.problem.weights)
+            total = cones.assemble(data)
+        with section("factorise"):
+            self.state.linear.factorise(data)  # 3
         mean = total / cones.degree
         if self.keep and self.gap < SNAPSHOT and self.violation < SNAPSHOT:
             cones.aim(mean)
@@ -148,10 +150,13 @@ class Iterate:
 
     def _direction(self) -> tuple[FloatArray, Change]:
         """One solve with the factor at hand: dx (n, 3), ds and dl."""
-        force, dx = self.r_d.copy(), np.zeros_like(self.r_d)
-        self.cones.push(force)
-        dx[self.free] = self.state.linear.solve(-force[self.free].ravel()).reshape(-1, 3)
-        return dx, self.cones.change(dx)
+        with section("cones"):
+            force, dx = self.r_d.copy(), np.zeros_like(self.r_d)
+            self.cones.push(force)
+        with section("back-substitute"):
+            dx[self.free] = self.state.linear.solve(-force[self.free].ravel()).reshape(-1, 3)
+        with section("cones"):
+            return dx, self.cones.change(dx)
 
     def _snapshot(self, dx: FloatArray, change: Change) -> None:
         a = 0.9 * change.length
