@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from strainbench.cli.display import progress, say
+import typer
+
+from strainbench.cli.display import errors, progress, say
 from strainbench.cli.interrupt import keeping
 from strainbench.cli.options import (
     LOCAL,
     AllSolvers,
     CellSeconds,
+    Debug,
     Duration,
     Folder,
     Jobs,
@@ -27,7 +30,7 @@ from strainbench.cli.options import (
     Threads,
     Tolerances,
 )
-from strainbench.escape import plain
+from strainbench.escape import plain, terminal
 from strainbench.options import shown
 from strainbench.progress import Observer, Work
 
@@ -53,6 +56,7 @@ def run_cells(
     processes: Processes = "fork",
     results: Folder = LOCAL / "run",
     rerun: Rerun = False,
+    debug: Debug = False,
 ) -> None:
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
     from strainbench.bench.machine import memory_share
@@ -64,6 +68,8 @@ def run_cells(
         raise ValueError(f"--processes {shown(processes)}: valid are {', '.join(STARTS)}")
     if scheduler is not None and not scheduler.strip():
         raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
+    if debug and scheduler is not None:
+        raise ValueError("--debug and --scheduler: one of them is valid, as workers keep prints")
     if steps is not None and duration is not None:
         raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
@@ -83,14 +89,16 @@ def run_cells(
         say(f"left out, as they cannot start warm: {', '.join(cold)}")
     jobs = min(jobs, len(cells))
     memory = memory_limit or memory_share(jobs)
-    _run(cells, Settings(results, jobs, memory, rerun, processes), scheduler)
+    _run(cells, Settings(results, jobs, memory, rerun or debug, processes), scheduler, debug)
 
 
-def _run(cells: Sequence[Cell], settings: Settings, scheduler: str | None) -> None:
+def _run(
+    cells: Sequence[Cell], settings: Settings, scheduler: str | None, debug: bool = False
+) -> None:
     """Run them here, or where a scheduler has workers."""
     from strainbench.bench.runner import Runner
 
-    with Display() as display, keeping(lambda: display.kept(len(cells))):
+    with Display(debug) as display, keeping(lambda: display.kept(len(cells))):
         if scheduler is not None:
             from strainbench.bench.cluster import run_on_cluster  # dask only where it is asked for
 
@@ -110,9 +118,15 @@ def _numbers(text: str) -> list[float]:
 
 
 class Display(Observer):
-    """A progress bar over all steps, with what is running, and a line for each ended cell."""
+    """A progress bar over all steps, with what is running, and a line for each ended cell.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    debug : end the run at the first cell that fails
+    """
+
+    def __init__(self, debug: bool = False) -> None:
+        self.debug = debug
         self.progress = progress("steps,")
         self.running: dict[str, int] = {}
         self.done = self.finished = 0
@@ -152,6 +166,16 @@ class Display(Observer):
         reason = f": {row['reason']}" if row["reason"] else ""
         say(f"{cell.title}: {time}, {row['outcome']}{reason}")
         self._show()
+
+    def failed(self, cell: Work, reason: str, printed: str) -> None:
+        """See the base class."""
+        if self.debug:
+            self.progress.stop()
+            for line in printed.expandtabs().splitlines():
+                indent = len(line) - len(line.lstrip(" "))
+                errors.print(" " * indent, terminal(line), sep="")
+            say(f"strainbench: stopped at {cell.title}: {reason}", errors)
+            raise typer.Exit(1)
 
     def waiting(self, what: str) -> None:
         """See the base class."""
