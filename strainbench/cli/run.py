@@ -61,17 +61,9 @@ def run_cells(
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
     from strainbench.bench.machine import memory_share
     from strainbench.bench.plan import never_warm, plan
-    from strainbench.bench.preload import STARTS
     from strainbench.bench.runner import Settings
 
-    if processes not in STARTS:
-        raise ValueError(f"--processes {shown(processes)}: valid are {', '.join(STARTS)}")
-    if scheduler is not None and not scheduler.strip():
-        raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
-    if debug and scheduler is not None:
-        raise ValueError("--debug and --scheduler: one of them is valid, as workers keep prints")
-    if steps is not None and duration is not None:
-        raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
+    _check_words(processes, scheduler, steps, duration, debug)
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
     cells = plan(
         scenarios,
@@ -90,6 +82,26 @@ def run_cells(
     jobs = min(jobs, len(cells))
     memory = memory_limit or memory_share(jobs)
     _run(cells, Settings(results, jobs, memory, rerun or debug, processes), scheduler, debug)
+
+
+def _check_words(
+    processes: str,
+    scheduler: str | None,
+    steps: int | None,
+    duration: float | None,
+    debug: bool,
+) -> None:
+    """ValueError for words of `run` that are wrong, or do not go together."""
+    from strainbench.bench.preload import STARTS
+
+    if processes not in STARTS:
+        raise ValueError(f"--processes {shown(processes)}: valid are {', '.join(STARTS)}")
+    if scheduler is not None and not scheduler.strip():
+        raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
+    if debug and scheduler is not None:
+        raise ValueError("--debug and --scheduler: one of them is valid, as workers keep prints")
+    if steps is not None and duration is not None:
+        raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
 
 
 def _run(
