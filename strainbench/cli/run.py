@@ -63,7 +63,7 @@ def run_cells(
     from strainbench.bench.plan import never_warm, plan
     from strainbench.bench.runner import Settings
 
-    _check_words(processes, scheduler, steps, duration, debug)
+    _check_words(scheduler, steps, duration, debug)
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
     cells = plan(
         scenarios,
@@ -85,17 +85,12 @@ def run_cells(
 
 
 def _check_words(
-    processes: str,
     scheduler: str | None,
     steps: int | None,
     duration: float | None,
     debug: bool,
 ) -> None:
     """ValueError for words of `run` that are wrong, or do not go together."""
-    from strainbench.bench.preload import STARTS
-
-    if processes not in STARTS:
-        raise ValueError(f"--processes {shown(processes)}: valid are {', '.join(STARTS)}")
     if scheduler is not None and not scheduler.strip():
         raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
     if debug and scheduler is not None:
