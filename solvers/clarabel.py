@@ -10,7 +10,7 @@ import clarabel
 import numpy as np
 import scipy.sparse as sp
 
-from strainbench import Clock, Problem, Solution, Solver
+from strainbench import Clock, Problem, Solution, Solver, section
 from strainbench.arrays import FloatArray
 from strainbench.problem.conic import ConicForm
 from strainbench.problem.kinds import Sampled
@@ -108,9 +108,11 @@ class Clarabel(Solver):
         settings.tol_gap_abs = self.accuracy * tolerance * state.least_gap(problem)
         settings.tol_feas = (1 if self.scaling is None else 100) * settings.tol_gap_abs
         settings.tol_gap_rel = settings.tol_gap_abs
-        q, rhs = state.vectors(problem)
-        state.solver.update(q=q, b=rhs, settings=settings)
-        result = state.solver.solve()
+        with section("update"):
+            q, rhs = state.vectors(problem)
+            state.solver.update(q=q, b=rhs, settings=settings)
+        with section("Clarabel"):
+            result = state.solver.solve()
         status = str(result.status)
         positions = state.positions(problem, np.array(result.x))
         if "Infeasible" in status:
@@ -121,7 +123,8 @@ class Clarabel(Solver):
             result.iterations,
             state.multipliers(np.array(result.z)),
         )
-        return claimed(problem, found, tolerance)
+        with section("claim"):
+            return claimed(problem, found, tolerance)
 
 
 UNSCALED = 1e-2

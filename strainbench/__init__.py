@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from strainbench.scenario.cloth import ClothScenario
     from strainbench.scenario.scenario import Scenario, SheetScenario, StepReport
     from strainbench.solver.memory import Memory
+    from strainbench.solver.sections import section
     from strainbench.solver.solve import solve
     from strainbench.solver.solver import Clock, Solution, Solver
 
@@ -40,6 +41,7 @@ __all__ = [
     "StepReport",
     "StretchLimits",
     "certify",
+    "section",
     "solve",
     "square_grid",
 ]
@@ -55,6 +57,7 @@ _HOMES = {
     "scenario.cloth": ("ClothScenario",),
     "scenario.scenario": ("Scenario", "SheetScenario", "StepReport"),
     "solver.memory": ("Memory",),
+    "solver.sections": ("section",),
     "solver.solve": ("solve",),
     "solver.solver": ("Clock", "Solution", "Solver"),
 }

@@ -45,5 +45,8 @@ class Observer:
     def ended(self, cell: Work, row: Mapping[str, object]) -> None:
         """A cell's row was written."""
 
+    def failed(self, cell: Work, reason: str, printed: str) -> None:
+        """A cell whose row was written ended before its time; what its process printed."""
+
     def waiting(self, what: str) -> None:
         """Nothing goes on until this comes."""

@@ -9,6 +9,7 @@ from tests.tally import Tally
 
 RUNNING = {
     *("test_runner", "test_cluster", "test_endings", "test_files"),
+    *("test_debug", "test_instance", "test_testset"),
     *("test_cli", "test_converge", "test_duel", "test_readme"),
 }
 LONG = {

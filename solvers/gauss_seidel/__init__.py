@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from solvers.gauss_seidel.elements import Elements, refusal
 from solvers.gauss_seidel.rows import Directions
-from strainbench import Clock, Problem, Solution, Solver
+from strainbench import Clock, Problem, Solution, Solver, section
 from strainbench.solver.memory import Memory
 
 VISITS_A_CHUNK = 3_000_000
@@ -97,7 +97,8 @@ class GaussSeidel(Solver):
             if deadline.passed:
                 return Solution(x, "time limit", done)
             sweeps = min(mark - done, chunk, self.max_sweeps - done)
-            done += state.mesh.sweep(problem, x, tolerance, sweeps)
+            with section("sweep"):
+                done += state.mesh.sweep(problem, x, tolerance, sweeps)
             if done == mark:
                 monitor(x.copy(), iterations=done)
                 mark *= 2

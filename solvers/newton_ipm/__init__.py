@@ -70,7 +70,7 @@ import numpy as np
 from solvers.newton_ipm.infeasible import infeasible_multipliers
 from solvers.newton_ipm.iterate import STRICTER, Iterate, State
 from solvers.newton_ipm.mesh import ROUNDING
-from strainbench import Clock, Problem, Solution, Solver
+from strainbench import Clock, Problem, Solution, Solver, section
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import NotPositiveDefiniteError
 from strainbench.problem.dual import dual_bound
@@ -193,7 +193,8 @@ multipliers have no bound, and the referee's may price a violation higher than t
         best, best_at, kept = np.inf, 0, None
         status = "iteration limit"
         for k in range(self.max_iterations + 1):
-            error = iterate.measure()
+            with section("measure"):
+                error = iterate.measure()
             if k:
                 monitor(iterate.x, iterate.Y)
             if error < best:

@@ -8,7 +8,7 @@ from solvers.newton_ipm.exact import ExactCones
 from solvers.newton_ipm.matrix import Matrix
 from solvers.newton_ipm.mesh import Change, put, residual, take
 from solvers.newton_ipm.sampled import SampledCones
-from strainbench import Problem
+from strainbench import Problem, section
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import best_linear_solver
 from strainbench.problem.kinds import Exact, Kind, Sampled
@@ -121,9 +121,12 @@ class Iterate:
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
-        cones, values = self.cones, self.state.matrix.mass()
-        total = cones.assemble(values)
-        self.state.linear.factorise(values)  # 3
+        cones = self.cones
+        with section("assemble"):
+            values = self.state.matrix.mass()
+            total = cones.assemble(values)
+        with section("factorise"):
+            self.state.linear.factorise(values)  # 3
         mean = total / cones.degree
         if self.keep and self.gap < SNAPSHOT and self.violation < SNAPSHOT:
             cones.aim(mean)
@@ -155,11 +158,15 @@ class Iterate:
 
     def _direction(self) -> tuple[FloatArray, Change]:
         """One solve with the factor at hand: dx (n, 3), ds and dl."""
-        force, dx, b = self.r_d.copy(), np.zeros_like(self.r_d), np.empty(3 * len(self.free))
-        self.cones.push(force)
-        take(force, self.free, b)
-        put(self.state.linear.solve(b), self.free, dx)
-        return dx, self.cones.change(dx)
+        with section("cones"):
+            force, dx, b = self.r_d.copy(), np.zeros_like(self.r_d), np.empty(3 * len(self.free))
+            self.cones.push(force)
+            take(force, self.free, b)
+        with section("back-substitute"):
+            found = self.state.linear.solve(b)
+        with section("cones"):
+            put(found, self.free, dx)
+            return dx, self.cones.change(dx)
 
     def _snapshot(self, dx: FloatArray, change: Change) -> None:
         a = 0.9 * change.length

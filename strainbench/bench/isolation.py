@@ -16,7 +16,8 @@ from strainbench.bench.ending import Ending
 from strainbench.bench.journal import EVENTS, GO, read_journal
 from strainbench.bench.load import Meter
 from strainbench.bench.play import Task, play_cell
-from strainbench.bench.process import Child, Family, Starter, spawned
+from strainbench.bench.process import OUTPUT, Child, Family, Starter, spawned
+from strainbench.files import content_of
 
 START_LIMIT = 180.0  # [s] to import the suite and plug-ins and to build the problem, cold disks
 WARM_UP_LIMIT = 20.0  # [s] at least, compilation apart; the time limit where that is longer
@@ -110,6 +111,16 @@ class Running:
         """Physics, set-up and solver."""
         begun = self._when("started")
         return (self._when("ended") or time.monotonic()) - begun if begun else 0.0
+
+    def failure(self) -> str:
+        """Why it did not come to its end, or ""; a time limit and a refusal are no failures."""
+        told = [str(e["reason"]) for e in self.events if e["event"] == "failed"]
+        reason = self.ending or next(iter(told), "")
+        return "" if Ending.of(reason) in (Ending.TIME_LIMIT, Ending.UNSUPPORTED) else reason
+
+    def printed(self) -> str:
+        """What its process printed, tracebacks too."""
+        return content_of(self.folder / OUTPUT).decode(errors="replace")
 
     def _when(self, event: str) -> float | None:
         return next((float(e["at"]) for e in self.events if e["event"] == event), None)

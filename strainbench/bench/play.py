@@ -60,7 +60,8 @@ def with_journal(folder: Path, work: Callable[[Journal], None]) -> None:
         reason = error.reason if isinstance(error, StageError) else told(error)
         journal.write("failed", reason=reason)
         with suppress(Exception):  # a solver may have closed what prints
-            traceback.print_exc()
+            cause = error.__cause__ if isinstance(error, StageError) else None
+            traceback.print_exception(cause or error)  # a plug-in's own, not what ours made of it
     journal.write("ended", peak_memory_mb=_peak_memory_mb() + untouched_mb())
 
 

@@ -219,6 +219,8 @@ class Runner:
         row |= {"start_seconds": item.start_seconds(), **item.meter.columns()}
         self.summary.judging += float(str(row.get("judge_seconds", 0.0)))
         self.write(item.cell, row, steps)
+        if failure := item.failure():
+            self.observer.failed(item.cell, failure, item.printed())
         shutil.rmtree(item.folder, ignore_errors=True)
 
     def write(self, cell: Cell, row: dict[str, object], steps: Sequence[dict[str, object]]) -> None:

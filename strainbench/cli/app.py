@@ -18,6 +18,7 @@ import typer
 from strainbench import __version__
 from strainbench.cli.advice import recommend
 from strainbench.cli.display import console, errors, say
+from strainbench.cli.instances import export_frames, make_test_set
 from strainbench.cli.interrupt import (
     INTERRUPTED,
     TERMINATED,
@@ -25,10 +26,11 @@ from strainbench.cli.interrupt import (
     TerminatedError,
     terminate,
 )
+from strainbench.cli.kit import check_solvers, profile_solver
 from strainbench.cli.pictures import draw_polar, render_scene
 from strainbench.cli.report import compare_results, report_results
 from strainbench.cli.run import run_cells
-from strainbench.cli.studies import export_frame, follow_solvers, keep_ledger, let_duel
+from strainbench.cli.studies import follow_solvers, keep_ledger, let_duel
 from strainbench.escape import terminal
 from strainbench.options import WrongWordError
 from strainbench.progress import SceneWarning
@@ -79,7 +81,10 @@ VERBS: dict[str, Callable[..., None]] = {
     "recommend": recommend,
     "converge": follow_solvers,
     "duel": let_duel,
-    "export": export_frame,
+    "profile": profile_solver,
+    "check": check_solvers,
+    "export": export_frames,
+    "testset": make_test_set,
     "ledger": keep_ledger,
     "render": render_scene,
     "polar": draw_polar,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
@@ -16,8 +16,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from strainbench.escape import terminal
-from strainbench.progress import Track
+from strainbench.escape import plain, terminal
+from strainbench.progress import Track, Work
 
 console = Console()
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -50,3 +50,11 @@ def tracking() -> Iterator[Track]:
     """A progress bar for whatever loops it is given."""
     with progress() as bar:
         yield lambda items, what, total: bar.track(items, total, description=what)
+
+
+@contextmanager
+def playing(cell: Work, frame: int) -> Iterator[Callable[[int], None]]:
+    """What shows how many projections a scene has asked for, on its way to `frame`."""
+    with progress() as bar:
+        task = bar.add_task(plain(f"playing {cell.title}"), total=max(frame - 1, 1))
+        yield lambda asked: bar.update(task, completed=asked - 1)

@@ -47,6 +47,9 @@ StepsOrAll = Annotated[
 ]
 StepsToLast = Annotated[int, _whole("--steps", "time steps; the last one is drawn")]
 Every = Annotated[int, _whole("--every", "keep each K-th step", metavar="K")]
+SomeSteps = Annotated[
+    int | None, _whole("--every", "of several projections each K-th, into a folder", metavar="K")
+]
 Duration = Annotated[
     float | None, _seconds("--duration", "of the scene's time a cell, instead of --steps")
 ]
@@ -71,6 +74,12 @@ SomeSolvers = Annotated[
     str, typer.Option("--solver", help="name, comma-separated names, or a path")
 ]
 OneSolver = Annotated[str, typer.Option("--solver", help="name, or path of a .py file")]
+CheckedSolver = Annotated[
+    str, typer.Argument(metavar="SOLVER", help="name, comma-separated names, path of a .py file")
+]
+Optimal = Annotated[
+    bool, typer.Option("--optimal", help="it promises the projection itself, not limits alone")
+]
 SolverBefore = Annotated[
     str,
     typer.Option("--solver", help="answers the projections before; name, or path of a .py file"),
@@ -136,6 +145,10 @@ Processes = Annotated[
         help="fork (cells, where the system can, from one that has loaded what they need) or spawn",
     ),
 ]
+Debug = Annotated[
+    bool,
+    typer.Option("--debug", help="stop at the first cell that fails; show where, and its prints"),
+]
 Rerun = Annotated[bool, typer.Option("--rerun", help="run finished cells again")]
 
 # what is reported
@@ -185,10 +198,26 @@ FramesFolder = Annotated[Path, _folder("folder that keeps the frames")]
 TableFile = Annotated[Path | None, _output("a .csv or .md file to write too", "a .csv or .md file")]
 PicturesFolder = Annotated[Path, _output("folder", metavar="DIR")]
 ChartFile = Annotated[Path, _output("an .svg, .png or .pdf file", "an .svg, .png or .pdf file")]
-ProblemFile = Annotated[Path, _output("the file to write", "a file")]
+ProblemPlace = Annotated[
+    Path, _output("the file to write; of several projections, the folder", "a file or folder")
+]
+TestSetFolder = Annotated[
+    Path, typer.Argument(parser=path("DIR"), metavar="DIR", help="folder of the instances")
+]
+Small = Annotated[
+    bool, typer.Option("--small", help="those of up to 6,000 variables alone; minutes")
+]
+Scaled = Annotated[
+    bool,
+    typer.Option("--scaled", help="CBF in units that solvers' defaults cope with; it says which"),
+]
+SomeFrames = Annotated[
+    str,
+    typer.Option("--frame", help="projection, the first being 1; 5,10 or 1-30 for several"),
+]
 ProblemFormat = Annotated[
     str | None,
-    typer.Option("--format", help="cbf or npz; by default what the file's name ends in"),
+    typer.Option("--format", help="cbf or npz; by default what the file's name ends in, or both"),
 ]
 PictureFormats = Annotated[
     str, typer.Option("--format", help="of png, gif, mp4, obj, ply, vtu, with commas")

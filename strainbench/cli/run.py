@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from strainbench.cli.display import progress, say
+import typer
+
+from strainbench.cli.display import errors, progress, say
 from strainbench.cli.interrupt import keeping
 from strainbench.cli.options import (
     LOCAL,
     AllSolvers,
     CellSeconds,
+    Debug,
     Duration,
     Folder,
     Jobs,
@@ -28,7 +31,7 @@ from strainbench.cli.options import (
     Timings,
     Tolerances,
 )
-from strainbench.escape import plain
+from strainbench.escape import plain, terminal
 from strainbench.options import shown
 from strainbench.progress import Observer, Work
 
@@ -55,16 +58,14 @@ def run_cells(
     processes: Processes = "fork",
     results: Folder = LOCAL / "run",
     rerun: Rerun = False,
+    debug: Debug = False,
 ) -> None:
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
     from strainbench.bench.machine import memory_share
     from strainbench.bench.plan import never_warm, plan
     from strainbench.bench.runner import Settings
 
-    if scheduler is not None and not scheduler.strip():
-        raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
-    if steps is not None and duration is not None:
-        raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
+    _check_words(scheduler, steps, duration, debug)
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
     how = (mode, steps, tolerances, time_limit, duration, starts, threads, repeats)
     cells = plan(scenarios, solvers, set_ or [], *how)
@@ -72,14 +73,34 @@ def run_cells(
         say(f"left out, as they cannot start warm: {', '.join(cold)}")
     jobs = min(jobs, len(cells))
     memory = memory_limit or memory_share(jobs)
-    run_here(cells, Settings(results, jobs, memory, rerun, processes), scheduler)
+    run_here(cells, Settings(results, jobs, memory, rerun or debug, processes), scheduler, debug)
 
 
-def run_here(cells: Sequence[Cell], settings: Settings, scheduler: str | None = None) -> None:
+def _check_words(
+    scheduler: str | None,
+    steps: int | None,
+    duration: float | None,
+    debug: bool,
+) -> None:
+    """ValueError for words of `run` that are wrong, or do not go together."""
+    if scheduler is not None and not scheduler.strip():
+        raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
+    if debug and scheduler is not None:
+        raise ValueError("--debug and --scheduler: one of them is valid, as workers keep prints")
+    if steps is not None and duration is not None:
+        raise ValueError(f"--steps {steps} and --duration {duration:g}: one of them is valid")
+
+
+def run_here(
+    cells: Sequence[Cell],
+    settings: Settings,
+    scheduler: str | None = None,
+    debug: bool = False,
+) -> None:
     """Run cells with a bar of progress, or have them run where a scheduler has workers."""
     from strainbench.bench.runner import Runner
 
-    with Display() as display, keeping(lambda: display.kept(len(cells))):
+    with Display(debug) as display, keeping(lambda: display.kept(len(cells))):
         if scheduler is not None:
             from strainbench.bench.cluster import run_on_cluster  # dask only where it is asked for
 
@@ -99,9 +120,15 @@ def _numbers(text: str) -> list[float]:
 
 
 class Display(Observer):
-    """A progress bar over all steps, with what is running, and a line for each ended cell."""
+    """A progress bar over all steps, with what is running, and a line for each ended cell.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    debug : end the run at the first cell that fails
+    """
+
+    def __init__(self, debug: bool = False) -> None:
+        self.debug = debug
         self.progress = progress("steps,")
         self.running: dict[str, int] = {}
         self.done = self.finished = 0
@@ -141,6 +168,16 @@ class Display(Observer):
         reason = f": {row['reason']}" if row["reason"] else ""
         say(f"{cell.title}: {time}, {row['outcome']}{reason}")
         self._show()
+
+    def failed(self, cell: Work, reason: str, printed: str) -> None:
+        """See the base class."""
+        if self.debug:
+            self.progress.stop()
+            for line in printed.expandtabs().splitlines():
+                indent = len(line) - len(line.lstrip(" "))
+                errors.print(" " * indent, terminal(line), sep="")
+            say(f"strainbench: stopped at {cell.title}: {reason}", errors)
+            raise typer.Exit(1)
 
     def waiting(self, what: str) -> None:
         """See the base class."""

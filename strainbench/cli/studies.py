@@ -4,35 +4,28 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from strainbench import __version__
-from strainbench.cli.display import console, progress, say, tracking
+from strainbench.cli.display import console, playing, progress, say, tracking
 from strainbench.cli.interrupt import keeping
 from strainbench.cli.options import (
     DEFAULT_SOLVER,
     LOCAL,
-    RECORDER,
     AllSolvers,
     AnyScenarios,
     Folder,
-    FrameNumber,
     FrameNumbers,
     FramesFolder,
     OneScenario,
     OneSolver,
-    ProblemFile,
-    ProblemFormat,
     ProjectionSeconds,
     Repeats,
     ScenariosValues,
-    SolverBefore,
     Solvers,
     SolverSeconds,
     SolversValues,
@@ -41,43 +34,12 @@ from strainbench.cli.options import (
     TightestTolerance,
     Tolerance,
     Units,
-    Values,
 )
-from strainbench.escape import plain
 
 if TYPE_CHECKING:
     from strainbench.bench.cell import Cell
     from strainbench.bench.recording import Recording
     from strainbench.problem.problem import Problem
-
-
-def export_frame(
-    scenario: OneScenario,
-    frame: FrameNumber,
-    output: ProblemFile,
-    format_: ProblemFormat = None,
-    solver: SolverBefore = RECORDER,
-    set_: Values = None,
-    tolerance: Tolerance = 1e-6,
-) -> None:
-    """Write one projection of a scene as a conic instance (CBF) or as arrays (npz)."""
-    from strainbench.bench.plan import plan_one
-    from strainbench.files import open_folder
-    from strainbench.problem.export import check_format, write_problem
-
-    if output.is_dir():
-        raise ValueError(
-            f"-o {output} is a folder: a file is valid, such as {output / 'frame.cbf'}"
-        )
-    kind = check_format(output.suffix.removeprefix(".") if format_ is None else format_)
-    cell = plan_one(scenario, solver, set_ or [], frame, tolerance)
-    open_folder(output.parent, "-o")
-    problem = _record(cell, frame)
-    before = f"those before by {cell.solver.label}"
-    about = f"{cell.scenario.label}, projection {frame}, {before}; strainbench {__version__}"
-    write_problem(problem, output, kind, about)
-    size = f"{3 * len(problem.free)} variables, {problem.constraints} constraints"
-    say(f"wrote {output}: {size}")
 
 
 def follow_solvers(
@@ -185,19 +147,11 @@ def keep_ledger(
         say(f"wrote {file}")
 
 
-def _record(cell: Cell, frame: int) -> Problem:
-    """A projection of a scene, with a progress bar on the way there."""
-    from strainbench.bench.recording import record
-
-    with _playing(cell, frame) as asked:
-        return record(cell, frame, asked)
-
-
 def _record_all(cell: Cell, numbers: Sequence[int]) -> list[Problem]:
     """Several projections of a scene, in one pass."""
     from strainbench.bench.recording import record_all
 
-    with _playing(cell, max(numbers)) as asked:
+    with playing(cell, max(numbers)) as asked:
         recording = record_all(cell, max(numbers), asked)
     return [recording.frame(number) for number in numbers]
 
@@ -208,15 +162,7 @@ def _recorded(cell: Cell, last: int, results: Path | None) -> Recording:
     from strainbench.bench.recording import record_all, recorded, recorder
 
     fed = recorder(cell)
-    with fixed_threads(1), _playing(fed, last) as asked:
+    with fixed_threads(1), playing(fed, last) as asked:
         if results is None:
             return record_all(fed, last, asked)
         return recorded(fed, last, results / "frames", asked)
-
-
-@contextmanager
-def _playing(cell: Cell, frame: int) -> Iterator[Callable[[int], None]]:
-    """What shows how many projections a scene has asked for, on its way to `frame`."""
-    with progress() as bar:
-        task = bar.add_task(plain(f"playing {cell.title}"), total=max(frame - 1, 1))
-        yield lambda asked: bar.update(task, completed=asked - 1)

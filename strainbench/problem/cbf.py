@@ -2,12 +2,13 @@
 
 CBF has no quadratic objective. With the variables (u, t), u those of `ConicForm`,
 
-    minimise t  such that  (t, 1, P^1/2 u) in QR,  b - A u in the problem's cones,
+    minimise t  such that  (t, k, P^1/2 u) in QR,  b - A u in the problem's cones,
 
-where QR is the rotated cone 2 t * 1 >= ||P^1/2 u||^2: the cone of the objective in Tang et al.
-2022, Eq. 12, so that t is the objective. Second-order cones follow it in CON, one a constraint.
-Semidefinite ones are matrices in PSDCON, their coefficients and constants in HCOORD and DCOORD
-by the lower triangle, without the factors sqrt(2) of `ConicForm`. Numbers keep all their digits.
+where QR is the rotated cone 2 t k >= ||P^1/2 u||^2: the cone of the objective in Tang et al.
+2022, Eq. 12, so that k t is the objective; k is 1 but in scaled files. Second-order cones follow
+it in CON, one a constraint. Semidefinite ones are matrices in PSDCON, their coefficients and
+constants in HCOORD and DCOORD by the lower triangle, without the factors sqrt(2) of `ConicForm`.
+Numbers keep all their digits.
 """
 
 from __future__ import annotations
@@ -24,28 +25,27 @@ from strainbench.problem.conic import ConicForm
 Lines = Iterator[str]
 
 
-def cbf_text(form: ConicForm, b: FloatArray, comments: Iterable[str]) -> str:
+def cbf_text(form: ConicForm, b: FloatArray, comments: Iterable[str], k: float = 1.0) -> str:
     """A cone program as the text of a CBF file.
 
     Parameters
     ----------
     b : the frame's constants
     comments : for the file's head, a line each
+    k : the constant of the objective's cone
     """
-    return (
-        "\n".join([*(f"# {' '.join(line.split())}" for line in comments), *_sections(form, b)])
-        + "\n"
-    )
+    head = (f"# {' '.join(line.split())}" for line in comments)
+    return "\n".join([*head, *_sections(form, b, k)]) + "\n"
 
 
-def _sections(form: ConicForm, b: FloatArray) -> Lines:
+def _sections(form: ConicForm, b: FloatArray, k: float) -> Lines:
     u = form.P.shape[0]
     objective = sp.block_array(  # (t, 1, P^1/2 u), t being the last variable
         [[None, sp.csr_array([[1.0], [0.0]])], [sp.diags_array(np.sqrt(form.P.diagonal())), None]]
     )
     limits = sp.hstack([-form.A, sp.csr_array((len(b), 1))])
     one = np.zeros(u + 2)
-    one[1] = 1.0
+    one[1] = k
     cones = [f"QR {u + 2}"]
 
     yield from ("VER", "1", "", "OBJSENSE", "MIN", "", "VAR", f"{u + 1} 1", f"F {u + 1}", "")

@@ -45,6 +45,7 @@ from strainbench.problem.conic import ConicForm
 from strainbench.problem.limits import StretchLimits
 from strainbench.problem.problem import Problem
 
+SCALE, BALANCE = 1e3, 0.03  # of scaled files; see `as_cbf`
 LARGEST_RATIO = 1032
 """Bytes that a compressed one can become at most: DEFLATE's own limit (zlib, technical details)."""
 
@@ -56,13 +57,16 @@ def check_format(kind: str) -> str:
     return kind
 
 
-def write_problem(problem: Problem, path: Path, kind: str, about: str) -> None:
+def write_problem(
+    problem: Problem, path: Path, kind: str, about: str, scaled: bool = False
+) -> None:
     """Write `problem` to a file, which is there as a whole or as it was before.
 
     Parameters
     ----------
     kind : of FORMATS
     about : where it comes from, kept in the file
+    scaled : whether a CBF has the units of `as_cbf`; an npz has metres
 
     Raises
     ------
@@ -70,7 +74,7 @@ def write_problem(problem: Problem, path: Path, kind: str, about: str) -> None:
         One line: another format, one that cannot hold the problem, or a file that cannot be
         written.
     """
-    content = FORMATS[check_format(kind)](problem, about)
+    content = content_of(problem, kind, about, scaled)
     open_folder(path.parent, "-o")
     part = path.with_name(f".{os.getpid()}.part")
     try:
@@ -81,20 +85,52 @@ def write_problem(problem: Problem, path: Path, kind: str, about: str) -> None:
         raise ValueError(f"-o {path} cannot be written to ({error.strerror})") from None
 
 
-def as_cbf(problem: Problem, about: str) -> bytes:
-    """The cone program in the Conic Benchmark Format; see `strainbench.problem.cbf`."""
+def content_of(problem: Problem, kind: str, about: str, scaled: bool = False) -> bytes:
+    """What the file holds."""
+    if scaled and check_format(kind) == "cbf":
+        return as_cbf(problem, about, scaled)
+    return FORMATS[check_format(kind)](problem, about)
+
+
+def as_cbf(problem: Problem, about: str, scaled: bool = False) -> bytes:
+    """The cone program in the Conic Benchmark Format; see `strainbench.problem.cbf`.
+
+    Parameters
+    ----------
+    scaled : lengths in mean edges, the objective SCALE times what it then is over the mean weight,
+        and BALANCE times the constant of its cone that would make the cone's first two entries
+        alike at the optimum, as far as that can be guessed. Tuned with Clarabel's defaults on 17
+        projections of 100 to 1,300 variables: it says Solved of all, with objectives off by 3e-5 at
+        most; of those in metres it says AlmostSolved of 2, and others are off by up to 2e-3.
+    """
     if not problem.convex:
         raise ValueError(
             "--format cbf: limits on compression (lower bounds) are no cones; --format npz is valid"
         )
-    form = ConicForm(problem)
+    form = ConicForm(problem, SCALE if scaled else None)
+    k = BALANCE * np.sqrt(form.scale * guessed_objective(problem)) if scaled else 1.0
+    factor = float(k / form.scale)
+    length, value = ("[m]", "t") if factor == form.unit == 1 else ("in units", f"{factor!r} t")
     comments = [
         about,
-        f"minimise t = 1/2 ||x - target||_M^2 such that {problem.kind.formula}",
-        f"variables 0 to {form.P.shape[0] - 1}: x - target [m] of the free vertices, three each",
+        f"minimise {value} = 1/2 ||x - target||_M^2 such that {problem.kind.formula}",
+        f"variables 0 to {form.P.shape[0] - 1}: x - target {length} of the free vertices, three "
+        "each",
         f"variable {form.P.shape[0]}: t",
     ]
-    return cbf_text(form, form.constants(problem), comments).encode(errors="backslashreplace")
+    if scaled:
+        comments.append(f"unit of length: {form.unit!r} m, so x = target + {form.unit!r} u")
+        comments.append(f"objective in m^2, or kg m^2 with masses: {factor!r} t")
+    text = cbf_text(form, form.constants(problem), comments, float(k))
+    return text.encode(errors="backslashreplace")
+
+
+def guessed_objective(problem: Problem) -> float:
+    """Its size at the optimum, from the target's violations over the size of the mesh."""
+    size = problem.edge_length * np.sqrt(len(problem.used))
+    far = size * np.sqrt(np.mean(problem.violations(problem.target) ** 2))
+    guess = 0.5 * far**2 * float(np.sum(problem.weights[problem.free]))
+    return float(max(guess, problem.objective_floor))
 
 
 def as_npz(problem: Problem, about: str) -> bytes:

@@ -31,6 +31,9 @@ VERBS = {
     "converge": ["swing", "--solver", "clarabel", *SMALL, "--frame", "1"],
     "duel": ["swing", *SOLVER, *SMALL, "--frame", "1"],
     "ledger": ["swing", *SMALL, "--steps", "1"],
+    "profile": ["swing", *SOLVER, *SMALL, "--frame", "1"],
+    "check": ["none"],
+    "testset": ["d", "--small"],
 }
 """A valid line of each verb, to which one wrong word is added."""
 WHOLE = ["", "x", "-1", "0", "1.5", "nan", "inf", "99999999999999999999"]
@@ -89,7 +92,7 @@ NONSENSE = {
     "--camera": ["", "x", "30", "nan,30", "30,91", "inf,0", "1,2,3"],
     "--scale": ["", "x", "0", "-5%", "nan", "inf", "5", "%"],
 }
-FLAGS = {"--rerun", "--units", "--measure", "--help"}
+FLAGS = {"--rerun", "--units", "--measure", "--help", "--debug", "--optimal", "--scaled", "--small"}
 
 
 def options():
@@ -103,7 +106,7 @@ def options():
 
 def test_every_option_is_tried():
     assert {name for _, name in options()} == set(NONSENSE)
-    assert {verb for verb, _ in options()} == set(VERBS)
+    assert set(get_command(cli.app).commands) == {*VERBS, "list"}
 
 
 CASES = [
@@ -153,6 +156,13 @@ def test_a_verb_that_is_nearly_right_is_told(monkeypatch, capsys):
         (["run", "swing", "--set", "resolution=100000"], "resolution is 100000: its arrays need"),
         (["export", "swing", "--frame", "1", "-o", "folder"], "such as folder/frame.cbf"),
         (["export", "swing", "--frame", "1", "-o", "x.txt"], "valid are cbf, npz"),
+        (["run", "swing", "--debug", "--scheduler", "x"], "--debug and --scheduler: one of them"),
+        (["check", ""], "no solver called ''"),
+        (["check", "clarable"], "(did you mean clarabel?)"),
+        (["check", "./nowhere.py"], "./nowhere.py: no such file"),
+        (["check"], "Missing argument"),
+        (["testset", ""], "DIR '': the path of a folder is valid"),
+        (["testset", "file"], "file/optima cannot be written to"),
         (["converge", "swing", "--solver", "none", "--frame", "1"], "other solvers are valid"),
         (["render", "swing", "--scale", "5"], "5% is valid, or 500% if it is meant"),
         (["render", "swing", "-o", "file/x"], "file/x cannot be written to"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from io import BytesIO
 from itertools import islice
 from zipfile import ZIP_DEFLATED, ZipFile
@@ -101,6 +102,52 @@ def test_cbf_has_the_optimum_of_solve(case, swing, tmp_path):
     assert value == pytest.approx(problem.objective(solution.positions), rel=1e-6)
     moved = (solution.positions - problem.target)[problem.free]
     assert z[:-1].reshape(-1, 3) == pytest.approx(moved, abs=1e-3 * problem.edge_length)
+
+
+def solved_by_defaults(path):
+    """What Clarabel's defaults make of a file."""
+    c, A, b, cones = read_cbf(path)
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    nothing = sp.csc_matrix((len(c), len(c)))
+    result = clarabel.DefaultSolver(nothing, c, sp.csc_matrix(A), b, cones, settings).solve()
+    assert str(result.status) == "Solved"
+    return result
+
+
+def numbers_of(text, pattern):
+    return float(re.search(pattern, text)[1])
+
+
+@pytest.mark.parametrize("case", range(6))
+def test_a_scaled_cbf_is_solved_by_defaults_and_says_how_to_map_back(case, swing, tmp_path):
+    problem = cases(swing)[case]
+    write_problem(problem, tmp_path / "a.cbf", "cbf", "a test", scaled=True)
+    result = solved_by_defaults(tmp_path / "a.cbf")
+    text = (tmp_path / "a.cbf").read_text()
+    unit = numbers_of(text, r"x = target \+ (\S+) u")
+    factor = numbers_of(text, r"# objective in .*: (\S+) t")
+    solution = solve(problem, "clarabel-tight", tolerance=1e-7)
+    assert factor * result.obj_val == pytest.approx(problem.objective(solution.positions), rel=1e-4)
+    moved = (solution.positions - problem.target)[problem.free]
+    u = np.array(result.x)[:-1].reshape(-1, 3)
+    assert unit * u == pytest.approx(moved, abs=1e-2 * problem.edge_length)
+
+
+HARD = [
+    ("swing", ["resolution=10", "limit=0.1%"], 8),
+    ("stress", ["case=mass-ratio"], 1),
+    ("swing", ["resolution=20"], 8),
+    ("garment", ["resolution=6"], 8),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scene", "settings", "frame"), HARD)
+def test_scaled_files_of_scenes_are_solved_by_defaults(scene, settings, frame, tmp_path):
+    problem = record(plan_one(scene, "newton-ipm", settings, 1, 1e-6), frame)
+    write_problem(problem, tmp_path / "a.cbf", "cbf", "a test", scaled=True)
+    assert solved_by_defaults(tmp_path / "a.cbf").iterations < 60
 
 
 @pytest.mark.parametrize("seed", range(3))
