@@ -9,14 +9,14 @@ import pandas as pd
 from strainbench.bench.columns import WORDS
 from strainbench.bench.records import RecordsError, read_machines
 from strainbench.document import Document, Prose, Table
-from strainbench.document.page import page
 from strainbench.document.writers import csv, markdown
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_table
 from strainbench.report.failures import failures, failures_document
 from strainbench.report.names import with_names
+from strainbench.report.page import report_page
 from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_tables
-from strainbench.report.table import as_document, as_latex, as_markdown, tidy
+from strainbench.report.table import as_latex, as_markdown, tidy
 from strainbench.report.versions import shown_runs
 
 
@@ -43,12 +43,10 @@ def write_report(folder: Path) -> list[Path]:
     machines = read_machines(folder)
     charts = speed_accuracy(runs, folder / "speed-accuracy") + draw_energy(folder, runs)
     charts += draw_sweeps(folder, runs)
-    drawings = [path for path in charts if path.suffix == ".svg"]
     texts = {
         "table1.csv": csv(Table.of(tidy(runs))),
         "table1.md": as_markdown(runs, machines),
         "table1.tex": as_latex(runs),
-        "index.html": page(as_document(runs, machines, "strainbench results", drawings)),
     }
     if swept := sweep_tables(runs):
         texts["sweeps.md"] = markdown(Document("Sweeps", [Prose(BEYOND), *swept]))
@@ -58,6 +56,7 @@ def write_report(folder: Path) -> list[Path]:
         texts["failures.md"] = markdown(failures_document(failed, runs, machines))
     if (energy := energy_table(folder, runs)).lines:
         texts["energy.md"] = markdown(energy)
+    texts["index.html"] = report_page(folder, runs, machines, [*texts, *(p.name for p in charts)])
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return [*(folder / name for name in texts), *charts]

@@ -4,22 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import pandas as pd
 
+from strainbench.escape import plain
 from strainbench.report.measures import FEASIBLE, OPTIMAL
+from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart
 from strainbench.report.table import UNCONSTRAINED
 
-CASE = ("scene", "mode", "bound", "mesh")
+READ = ("solver", "ending", "why", "time", "time_low", "time_high", "time_limit", "distance_max")
+"""Columns that races are about."""
+CASE = ("scene", "mode", "bound", "aim", "mesh")
+SHOWN = ("scene", "mesh", "bound", "solver", "machine")
+"""Columns with words that are foreign, or may be."""
 LEVEL = 1.2  # times the fastest: whoever takes less is level with it
 
 
-def scene_names(runs: pd.DataFrame) -> list[str]:
-    """Each row's scene, with what tells it from others of its folder, limit and size apart."""
+def with_cases(runs: pd.DataFrame) -> pd.DataFrame:
+    """Runs with `scene` and its settings that tell it from others of its folder, and `aim`, the
+    tolerance; foreign words as they are shown."""
+    settings = apart(runs, {*SPANNED, MESH_FILE, CURVE_FILE}, {"steps_asked": "{:.0f} steps"})
     many = runs["threads"].nunique() > 1
     threads = [f"{n:.0f} threads" if many else "" for n in runs["threads"]]
-    parts = zip(runs["scenario"], runs["apart"], threads, strict=True)
-    return [", ".join(filter(None, words)) for words in parts]
+    parts = zip(runs["scenario"], settings, threads, strict=True)
+    named = runs.assign(
+        scene=[", ".join(filter(None, words)) for words in parts],
+        aim=[f"tolerance {value:g}".replace("e-0", "e-") for value in runs["tolerance"]],
+    )
+    return named.assign(**{name: named[name].map(plain) for name in SHOWN})
 
 
 @dataclass(frozen=True)
@@ -29,13 +42,13 @@ class Race:
     place: str
     rows: pd.DataFrame
 
-    @property
+    @cached_property
     def ranked(self) -> pd.DataFrame:
         """The faster the earlier."""
         solved = self.rows[(self.rows["ending"] == OPTIMAL) & self.rows["time"].notna()]
         return solved.sort_values("time", kind="stable")
 
-    @property
+    @cached_property
     def first(self) -> list[str]:
         """The fastest, with those that are level with it."""
         ranked = self.ranked
@@ -64,13 +77,14 @@ class Race:
 
 def races(runs: pd.DataFrame) -> list[Race]:
     """Those of a folder: rows with `scene` and what `measured` adds, the smaller size first."""
-    ran = runs[runs["solver"] != UNCONSTRAINED].sort_values(["resolution", "mesh"], kind="stable")
+    ran = runs[[*READ, *CASE, "resolution"]].sort_values(["resolution", "mesh"], kind="stable")
+    ran = ran[ran["solver"] != UNCONSTRAINED]
     apart = [name for name in CASE if ran[name].nunique() > 1] or ["mesh"]
     cases = ran.groupby(list(CASE), sort=False, dropna=False)
-    return [Race(_place(rows.iloc[0], apart), rows) for _, rows in cases]
+    return [Race(_place(rows.iloc[0], apart), rows[list(READ)]) for _, rows in cases]
 
 
 def _place(row: pd.Series, apart: Sequence[str]) -> str:
     """Such as 20×20, or what else tells the case from the others."""
-    words = [f"{row[name]}" for name in ("mesh", "bound", "scene", "mode") if name in apart]
+    words = [f"{row[name]}" for name in ("mesh", "bound", "scene", "mode", "aim") if name in apart]
     return ", ".join(filter(None, words))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -13,7 +13,6 @@ from strainbench.report.page.races import Race, races
 from strainbench.report.page.words import capital, count, listed
 
 BUSY = 0.5  # other work a core: from here on times say little
-NAMED = 8  # names at most
 PLACES = 3
 
 
@@ -26,12 +25,13 @@ class Tile:
     section: str
 
 
-def tiles(runs: pd.DataFrame, failed: pd.DataFrame) -> list[Tile]:
+def tiles(runs: pd.DataFrame, steps: pd.DataFrame, failed: pd.DataFrame) -> list[Tile]:
     """Those that there is anything to say in.
 
     Parameters
     ----------
     runs : with `scene` and what `measured` adds
+    steps : with numbers as numbers
     failed : as `strainbench.report.failures.failures` has it
     """
     found = races(runs)
@@ -39,7 +39,7 @@ def tiles(runs: pd.DataFrame, failed: pd.DataFrame) -> list[Tile]:
         ("Exact and fast", "table"): exact(found),
         ("Admissible is not optimal", "speed"): admissible(found),
         ("What breaks", "failures"): breaks(failed),
-        ("What this cannot say", "protocol"): unsaid(runs),
+        ("What this cannot say", "protocol"): unsaid(runs, steps),
     }
     return [Tile(head, text, section) for (head, section), text in texts.items() if text]
 
@@ -49,12 +49,7 @@ def exact(found: Sequence[Race]) -> str:
     if not found:
         return ""
     if len(found) > PLACES:
-        always = _always(found, lambda rows: rows["ending"] == OPTIMAL)
-        methods = {name for race in found for name in race.rows["solver"]}
-        return (
-            f"The optimum on every step of all {count(len(found))} cases: "
-            f"{count(len(always))} of {len(methods)} methods. {_names(always)}"
-        )
+        return _often(found)
     solved = [(list(race.ranked["solver"]), race) for race in found]
     shares = [
         f"{count(len(names))} of {len(race.rows)} methods at {race.place}" for names, race in solved
@@ -66,17 +61,16 @@ def exact(found: Sequence[Race]) -> str:
     return f"The optimum on every step: {listed(shares)}{within}.{at}"
 
 
-def _always(found: Sequence[Race], passed: Callable[[pd.DataFrame], pd.Series]) -> list[str]:
-    """Methods that pass on every case that they ran on, and on more than one."""
+def _often(found: Sequence[Race]) -> str:
+    """Who reaches it on most of many cases."""
     rows = pd.concat([race.rows for race in found])
-    good = passed(rows).groupby(rows["solver"], sort=False).agg(["all", "size"])
-    return list(good.index[good["all"] & (good["size"] > 1)])
-
-
-def _names(names: Sequence[str]) -> str:
-    """As a sentence, the first of them."""
-    more = [f"{count(len(names) - NAMED)} more"] if len(names) > NAMED else []
-    return f"{capital(listed([*names[:NAMED], *more]))}." if names else ""
+    solved = (rows["ending"] == OPTIMAL).groupby(rows["solver"], sort=False).sum()
+    most, total = int(solved.max()), count(len(found))
+    if not most:
+        return f"None of {len(solved)} methods reaches the optimum on any of {total} cases."
+    names = [str(name) for name in solved.index[solved == most]]
+    often = f"all {total} cases" if most == len(found) else f"{count(most)} of {total} cases"
+    return f"The optimum on every step of {often}: {listed(names)}."
 
 
 def admissible(found: Sequence[Race]) -> str:
@@ -87,7 +81,7 @@ def admissible(found: Sequence[Race]) -> str:
         return ""
     race, rows = max(kept, key=lambda pair: len(pair[1]))
     far = 1000 * rows["distance_max"]
-    names = list(rows.sort_values("distance_max")["solver"])
+    names = list(rows.sort_values("distance_max")["solver"].unique())
     span = " to ".join(dict.fromkeys((length(far.min()), length(far.max()))))
     verb = "keeps the limits but stops" if len(names) == 1 else "keep the limits but stop"
     return (
@@ -115,10 +109,13 @@ def breaks(failed: pd.DataFrame) -> str:
     )
 
 
-def unsaid(runs: pd.DataFrame) -> str:
+def unsaid(runs: pd.DataFrame, steps: pd.DataFrame) -> str:
     """What was not run, or is not known well."""
-    meshes, limits = list(dict.fromkeys(runs["mesh"])), [b for b in dict.fromkeys(runs["bound"]) if b]
-    said = [f"Measured at {listed(meshes[:PLACES])} alone; other sizes are not known."] if len(meshes) <= PLACES else []
+    meshes = list(dict.fromkeys(runs["mesh"]))
+    limits = [name for name in dict.fromkeys(runs["bound"]) if name]
+    said = []
+    if len(meshes) <= PLACES:
+        said.append(f"Measured at {listed(meshes)} alone; other sizes are not known.")
     if len(limits) == 1:
         said.append(f"Only the limit of {limits[0]} was run.")
     repeats = _largest(runs, "repeats")
@@ -126,7 +123,7 @@ def unsaid(runs: pd.DataFrame) -> str:
         said.append("Each projection was timed once: bars are over frames, not over repeats.")
     if (load := _largest(runs, "load")) > BUSY:
         said.append(f"Other work on the machine: up to {load:.1f} a core.")
-    if "contact" in " ".join(runs["needs"].fillna("")) and not _touched(runs):
+    if "contact" in " ".join(runs["needs"].fillna("")) and not (steps["contact_energy"] > 0).any():
         said.append("Contact was never reached.")
     return " ".join(said)
 
@@ -136,7 +133,3 @@ def _largest(runs: pd.DataFrame, column: str) -> float:
     if column not in runs or not runs[column].notna().any():
         return 0.0
     return float(pd.to_numeric(runs[column]).max())
-
-
-def _touched(runs: pd.DataFrame) -> bool:
-    return bool((runs.get("penetration_max", pd.Series(dtype=float)) > 0).any())

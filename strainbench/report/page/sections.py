@@ -1,0 +1,167 @@
+"""The sections of the page; one without anything to show is left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pandas as pd
+from markdown_it import MarkdownIt
+from markupsafe import Markup
+
+from strainbench.bench.columns import RUN_COLUMNS
+from strainbench.bench.records import RUNS, read_rows
+from strainbench.document import Items, Part, Picture, Prose, Table
+from strainbench.document.html import html
+from strainbench.report import warm
+from strainbench.report.energy import energy_table
+from strainbench.report.failures import EXPLANATION
+from strainbench.report.machine import machine_section
+from strainbench.report.sweep import BEYOND, sweep_tables
+from strainbench.report.table import OLDER, details, explanation, ledger_table, older, reasons
+
+OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md"}
+HEAVY = 1_500_000  # bytes of a folder's pictures that stand in the page; the others are linked
+Machines = Mapping[str, Mapping[str, object]]
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A chart on the page.
+
+    Parameters
+    ----------
+    about : the scene, mode, limit and size that it shows, as far as it shows one alone
+    specs : by the target's name
+    """
+
+    name: str
+    title: str
+    caption: str
+    about: Mapping[str, str]
+    specs: Mapping[str, object]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading, how to read what is below, charts, places that the script fills, the rest."""
+
+    name: str
+    title: str
+    how: str
+    charts: Sequence[Drawn] = ()
+    boxes: Sequence[str] = ()
+    body: Markup = field(default=Markup())
+
+
+def sections(
+    folder: Path,
+    runs: pd.DataFrame,
+    failed: pd.DataFrame,
+    machines: Machines,
+) -> list[Section]:
+    """Those that have something to show."""
+    first = runs.iloc[0]
+    signs = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
+    every = [
+        Section(
+            "table",
+            "Table 1",
+            "Bold is the fastest method that is optimal on every step. Grey numbers belong to runs "
+            "that do not count: they violate or did not finish. A row opens its record.",
+            boxes=("table1", "cells"),
+            body=html(warm.table(runs), 3),
+        ),
+        Section(
+            "failures",
+            "Where methods fail",
+            "A square says what was found, what an easier neighbour gave, and whose fault it is.",
+            boxes=("matrix",) if len(failed) else (),
+            body=Markup().join(
+                [
+                    _signs(failed, signs),
+                    _folded("Sweeps in numbers", sweep_tables(runs), Prose(BEYOND)),
+                ]
+            ),
+        ),
+        Section(
+            "convergence",
+            "Convergence and energy",
+            "How far an answer is from the optimum as time goes on; what happens to the energy.",
+            body=_folded("Energies in numbers", [energy_table(folder, runs)]),
+        ),
+        Section("pictures", "Pictures", "Of the scenes.", body=_pictures(folder)),
+        Section(
+            "protocol",
+            "Protocol and machine",
+            "What was measured, how, where, and what is older than what is installed.",
+            body=_protocol(folder, runs, machines),
+        ),
+    ]
+    return [part for part in every if part.charts or part.boxes or part.body]
+
+
+def _signs(failed: pd.DataFrame, signs: str) -> Markup:
+    return html(Prose(signs.replace("\n\n", " "))) if len(failed) else Markup()
+
+
+def _folded(title: str, parts: Iterable[Part], *before: Part) -> Markup:
+    """Behind a line that opens it; nothing if there is nothing."""
+    body = Markup().join(html(part, 4) for part in parts)
+    above = Markup().join(html(part, 4) for part in before)
+    form = Markup("<details><summary>{}</summary>{}{}</details>")
+    return form.format(title, above, body) if body else Markup()
+
+
+def _protocol(folder: Path, runs: pd.DataFrame, machines: Machines) -> Markup:
+    kept = reasons(runs)
+    return Markup().join(
+        [
+            html(Prose(explanation(runs))),
+            html(Items(older(runs), Prose(OLDER))),
+            html(machine_section(machines), 3),
+            _folded(kept.title, kept.parts),
+            _folded("Inside the solve, means", details(runs).parts),
+            _folded("Model ledger", [ledger_table(runs)]),
+            _folded("Rows that newer ones stand for", [_superseded(folder, runs)]),
+            *(_text(path) for path in sorted(folder.glob("*.md")) if path.name not in OURS),
+        ]
+    )
+
+
+def _superseded(folder: Path, runs: pd.DataFrame) -> Table:
+    """Cells of runs.csv that are not shown, as the code has changed since."""
+    shown = set(runs["cell"])
+    rows = {row["cell"]: row for row in read_rows(folder / RUNS, RUN_COLUMNS)}
+    names = ("cell", "scenario", "resolution", "limit", "mode", "solver", "outcome", "finished_at")
+    lines = [[row[name] for name in names] for cell, row in rows.items() if cell not in shown]
+    return Table("", names, lines)
+
+
+def _text(path: Path) -> Markup:
+    """What else was written about the folder, such as a comparison."""
+    reader = MarkdownIt("commonmark", {"html": False}).enable("table")
+    body = Markup(reader.render(path.read_text(encoding="utf-8")))
+    return Markup("<details><summary>{}</summary>{}</details>").format(path.name, body)
+
+
+def _pictures(folder: Path) -> Markup:
+    """The folder's pictures that are not charts of ours, the small ones in the page."""
+    drawn = ("speed-accuracy", "energy", "sweep-")
+    paths = [
+        path
+        for path in sorted(folder.iterdir())
+        if path.suffix in (".png", ".gif", ".svg") and not path.name.startswith(drawn)
+    ]
+    room, shown = HEAVY, []
+    for path in paths:
+        room -= path.stat().st_size
+        form = Markup("<figure>{}<figcaption>{}</figcaption></figure>")
+        linked = Markup('<a href="{0}"><img src="{0}" alt="{0}" loading="lazy"></a>').format(
+            path.name
+        )
+        shown.append(form.format(html(Picture(path, path.stem)) if room > 0 else linked, path.stem))
+    return (
+        Markup('<div class="pictures">{}</div>').format(Markup().join(shown)) if shown else Markup()
+    )
