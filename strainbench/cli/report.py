@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from strainbench.cli.display import console, say
+from strainbench.cli.display import console, say, tracking
 from strainbench.cli.options import LOCAL, Folder, TableFile
 from strainbench.options import path
 
@@ -17,8 +17,8 @@ def report_results(results: Folder = LOCAL / "run") -> None:
     from strainbench.files import disk_errors
     from strainbench.report import write_report
 
-    with disk_errors(results):
-        paths = write_report(results)
+    with disk_errors(results), tracking() as track:
+        paths = write_report(results, track)
     for written in paths:
         say(f"wrote {written}")
 

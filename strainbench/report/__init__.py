@@ -10,6 +10,7 @@ from strainbench.bench.columns import WORDS
 from strainbench.bench.records import RecordsError, read_machines
 from strainbench.document import Document, Prose, Table
 from strainbench.document.writers import csv, markdown
+from strainbench.progress import Track, untracked
 from strainbench.report.chart import speed_accuracy
 from strainbench.report.energy import draw_energy, energy_table
 from strainbench.report.failures import failures, failures_document
@@ -37,7 +38,7 @@ def load_runs(folder: Path) -> pd.DataFrame:
     return with_names(runs)
 
 
-def write_report(folder: Path) -> list[Path]:
+def write_report(folder: Path, track: Track = untracked) -> list[Path]:
     """Write table1.csv, .md, .tex, what else there is to tell, the charts and index.html."""
     runs = load_runs(folder)
     machines = read_machines(folder)
@@ -56,7 +57,8 @@ def write_report(folder: Path) -> list[Path]:
         texts["failures.md"] = markdown(failures_document(failed, runs, machines))
     if (energy := energy_table(folder, runs)).lines:
         texts["energy.md"] = markdown(energy)
-    texts["index.html"] = report_page(folder, runs, machines, [*texts, *(p.name for p in charts)])
+    files = [*texts, *(path.name for path in charts)]
+    texts["index.html"] = report_page(folder, runs, machines, files, track)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return [*(folder / name for name in texts), *charts]

@@ -12,11 +12,13 @@ from markupsafe import Markup
 
 from strainbench.document import Strong
 from strainbench.escape import plain
+from strainbench.progress import Track, untracked
 from strainbench.report.failures import failures
 from strainbench.report.identity import look
 from strainbench.report.measures import OPTIMAL, measured, numbers
 from strainbench.report.names import percent
 from strainbench.report.page import data
+from strainbench.report.page.drawn import packed
 from strainbench.report.page.headline import headline
 from strainbench.report.page.races import CASE, with_cases
 from strainbench.report.page.sections import Section, sections
@@ -31,7 +33,13 @@ SCRIPTS = ("parts.js", "drawer.js", "answer.js", "tables.js", "charts.js", "page
 Machines = Mapping[str, Mapping[str, object]]
 
 
-def report_page(folder: Path, runs: pd.DataFrame, machines: Machines, files: Sequence[str]) -> str:
+def report_page(
+    folder: Path,
+    runs: pd.DataFrame,
+    machines: Machines,
+    files: Sequence[str],
+    track: Track = untracked,
+) -> str:
     """The page of a results folder.
 
     Parameters
@@ -42,7 +50,7 @@ def report_page(folder: Path, runs: pd.DataFrame, machines: Machines, files: Seq
     steps = numbers(newest_steps(folder, runs))
     found = with_cases(measured(runs, steps))
     failed = failures(folder, runs)
-    parts = sections(folder, found, failed, machines)
+    parts = sections(folder, found, failed, machines, track)
     page: str = _template().render(
         title=folder.resolve().name,
         meta=_meta(found),
@@ -56,6 +64,7 @@ def report_page(folder: Path, runs: pd.DataFrame, machines: Machines, files: Seq
         style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
         vega=Markup(vega_script()),
         script=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)),
+        charts=packed(chart for part in parts for chart in part.charts),
         records=Markup(data.as_json(_payload(folder, found, steps, failed, parts))),
     )
     return page
@@ -88,9 +97,7 @@ def _payload(
         "aims": list(runs.sort_values("tolerance", ascending=False)["aim"].unique()),
         "sizes": list(ordered["mesh"].unique()),
         "grid": bool(runs["mesh"].str.contains("×").all()),
-        "charts": {
-            chart.name: {**chart.about, **chart.specs} for part in parts for chart in part.charts
-        },
+        "charts": {chart.name: chart.about for part in parts for chart in part.charts},
     }
 
 

@@ -1,6 +1,7 @@
 // Filters, chips, charts: what is chosen stands in the hash, everything follows it.
 const BLOCK = ["scene", "mode", "limit", "aim"];
 const FILTERS = [...BLOCK, "size", "ending"];
+const AGAINST = { distance: "distance to the optimum", gap: "relative gap", violation: "violation of the limits" };
 const MANY = 6; // blocks: beyond, the page begins with the first
 const blockOf = (cell) => JSON.stringify(BLOCK.map((name) => cell[name]));
 const state = {};
@@ -9,7 +10,7 @@ function readHash() {
   const first = data.blocks.length > MANY ? data.blocks[0] : [];
   const begin = Object.fromEntries(first.map((value, k) => [BLOCK[k], value]));
   const given = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
-  const names = [...FILTERS, "method", "cell"];
+  const names = [...FILTERS, "method", "cell", "against"];
   for (const name of names) state[name] = given[name] === "*" ? "" : (given[name] ?? begin[name] ?? "");
 }
 
@@ -21,6 +22,8 @@ function choose(changes) {
   history.replaceState(null, "", `#${words}`);
 }
 
+const isDrawn = (chart) => passes(chart) && (chart.against ?? against()) === against();
+const against = () => state.against || "distance";
 const passes = (item) => FILTERS.every((name) => !state[name] || item[name] === undefined || item[name] === null || item[name] === state[name]);
 const baseOf = (method) => data.methods[method]?.base ?? method;
 const related = (method) => method === state.method || baseOf(method) === state.method;
@@ -29,7 +32,7 @@ function refresh() {
   const cells = data.cells.filter(passes);
   drawTable1(cells);
   drawCells(cells);
-  for (const figure of document.querySelectorAll("figure.chart")) figure.hidden = !passes(data.charts[figure.dataset.chart]);
+  for (const figure of document.querySelectorAll("figure.chart")) figure.hidden = !isDrawn(data.charts[figure.dataset.chart]);
   for (const select of document.querySelectorAll("#filters select")) select.value = state[select.name];
   drawCharts();
 }
@@ -45,6 +48,13 @@ function filters() {
     byId("filters").append(el("select", { name, "aria-label": labels[name] ?? name, onchange: change }, all, ...each));
   }
   byId("filters").append(el("button", { type: "button", onclick: () => { choose(Object.fromEntries([...FILTERS, "method"].map((name) => [name, ""]))); refresh(); dim(); } }, "Show everything"));
+}
+
+function accuracies() {
+  const change = (event) => { choose({ against: event.target.value }); refresh(); };
+  const radio = ([value, text]) =>
+    el("label", {}, el("input", { type: "radio", name: "against", value, checked: value === against() && "", onchange: change }), ` ${text}`);
+  byId("against")?.append("Accuracy: ", ...Object.entries(AGAINST).map(radio));
 }
 
 function chips() {
@@ -96,6 +106,7 @@ function begin() {
   readHash();
   chips();
   filters();
+  accuracies();
   links();
   askSelects();
   drawMatrix();

@@ -14,33 +14,18 @@ from strainbench.bench.columns import RUN_COLUMNS
 from strainbench.bench.records import RUNS, read_rows
 from strainbench.document import Items, Part, Picture, Prose, Table
 from strainbench.document.html import html
+from strainbench.progress import Track
 from strainbench.report import warm
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.machine import machine_section
+from strainbench.report.page.drawn import Drawn, speed
 from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import OLDER, details, explanation, ledger_table, older, reasons
 
 OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md"}
 HEAVY = 1_500_000  # bytes of a folder's pictures that stand in the page; the others are linked
 Machines = Mapping[str, Mapping[str, object]]
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """A chart on the page.
-
-    Parameters
-    ----------
-    about : the scene, mode, limit and size that it shows, as far as it shows one alone
-    specs : by the target's name
-    """
-
-    name: str
-    title: str
-    caption: str
-    about: Mapping[str, str]
-    specs: Mapping[str, object]
 
 
 @dataclass(frozen=True)
@@ -60,11 +45,21 @@ def sections(
     runs: pd.DataFrame,
     failed: pd.DataFrame,
     machines: Machines,
+    track: Track,
 ) -> list[Section]:
     """Those that have something to show."""
     first = runs.iloc[0]
     signs = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
+    charts, left_out = speed(runs, track)
     every = [
+        Section(
+            "speed",
+            "Speed and accuracy",
+            "Lower left is better. The grey stair is the front that no method beats in both; the "
+            "yellow box is the question above. Hollow: within the limits, not the optimum.",
+            charts,
+            body=html(left_out),
+        ),
         Section(
             "table",
             "Table 1",
