@@ -58,6 +58,7 @@ CONTRAST = 4.5
 BRIGHT = 0.5  # luminance
 MIXES = (0.35, 0.5, 0.6)  # how much white or black a variant has
 VARIANT_DASHES = ((4, 1.5), (1.5, 1.5), (6, 1.5, 1.5, 1.5))
+PALEST = 0.6
 TURNS = (40, -40, 0)  # degrees of hue between methods of the user's
 
 
@@ -127,6 +128,16 @@ LOOKS = {
         Look(Family.NONE, "none", "#6F6F6F", BAR, (1, 3)),
     )
 }
+INTEGRATORS: dict[str, tuple[str, tuple[float, ...]]] = {
+    "sap": ("#0A3F8C", ()),
+    "sar": ("#C04A00", ()),
+    "sar-projected": ("#E8923A", (5, 2)),
+    "bap": ("#00786A", ()),
+    "bar-stable": ("#111111", ()),
+    "bar": ("#96296E", (6, 2, 1, 2)),
+    "bar-bdf2": ("#C2558F", (2, 2)),
+}
+"""Colour and dashes of each; lines of energy have no marks."""
 VARIANTS = {
     "clarabel": ("default", "tight", "paper"),
     "linearized-qp": ("default", "plain"),
@@ -146,6 +157,13 @@ def look(name: str) -> Look:
         return replace(YOURS, colour=_turned(YOURS.colour, turn))
     base = max(bases, key=len)
     return _variant(LOOKS[base], name[len(base) + 1 :])
+
+
+def integrator_look(name: str, pale: float = 0.0) -> Look:
+    """Of an integrator, `pale` from 0 to 1 by how small its step is beside others'."""
+    colour, dash = INTEGRATORS.get(name, (YOURS.colour, ()))
+    mixed = _hex(_mixed(_rgb(colour), WHITE, PALEST * pale))
+    return Look(Family.OURS, "", mixed, CIRCLE, VARIANT_DASHES[0] if pale else dash)
 
 
 def _variant(base: Look, name: str) -> Look:

@@ -96,9 +96,9 @@ def test_names_do_not_overlap_each_other_or_a_mark():
 
 
 def test_spread_names_keep_their_order_and_their_distance():
-    found = spread([5.0, 5.0, 90.0, 4.0], 10, 0, 100)
+    found = spread([5.0, 5.0, 90.0, 4.0], [10] * 4, 0, 100)
     assert sorted(found) == pytest.approx([found[3], found[0], found[1], 90.0])
-    assert min(found) >= 0
+    assert min(found) >= 5
     assert found[1] - found[0] == pytest.approx(10)
 
 

@@ -13,13 +13,13 @@ from typing import Any
 
 from strainbench.report.charts.axes import Axis
 from strainbench.report.charts.target import Target
-from strainbench.report.charts.text import BOLD, FONT, HEIGHT, Box, Placed, width, wrapped
-from strainbench.report.identity import look
+from strainbench.report.charts.text import BOLD, FONT, HEIGHT, Box, Placed, wrapped
+from strainbench.report.identity import Look, look
 
 Spec = dict[str, Any]
 SCHEMA = "https://vega.github.io/schema/vega-lite/v6.json"
 INK, SOFT, LINES, FAINT = "#202124", "#5F6368", "#DADCE0", "#E8EAED"
-RAIL, RAIL_INK, BAND, FRONT = "#FBEDEA", "#A8281B", "#F1F3F4", "#9AA0A6"
+BAND, FRONT = "#F1F3F4", "#9AA0A6"
 CHOSEN = "chosen"
 """The parameter that names the method to be seen, all others dimmed; empty for all."""
 DIMMED = 0.12
@@ -48,11 +48,22 @@ class Plane:
 
     def __post_init__(self) -> None:
         self.height = self.height or self.target.sizes.height
+        self.x = self.x.thinned(self.width, self.target.sizes.text)
+
+    @staticmethod
+    def room(target: Target, right: float = 10.0) -> float:
+        """The width of a plane with so much room beside it."""
+        return target.sizes.width - target.sizes.left - right
 
     @property
     def width(self) -> float:
         """Of the plane alone."""
-        return self.target.sizes.width - self.target.sizes.left - self.right
+        return self.room(self.target, self.right)
+
+    @property
+    def across(self) -> float:
+        """The width of a rail, which goes on beside the plane."""
+        return self.room(self.target)
 
     @property
     def box(self) -> Box:
@@ -112,9 +123,11 @@ class Plane:
         self.leaders(leaders)
         self.texts(rows, "center")
 
-    def leaders(self, rows: Iterable[Mapping[str, object]]) -> None:
+    def leaders(self, rows: Iterable[Mapping[str, object]], dotted: bool = False) -> None:
         """Thin lines from px, py to px2, py2."""
-        mark = {"type": "rule", "color": FRONT, "strokeWidth": 0.5 * self.target.sizes.line}
+        mark: Spec = {"type": "rule", "color": FRONT, "strokeWidth": 0.5 * self.target.sizes.line}
+        if dotted:
+            mark["strokeDash"] = [1, 2]
         self.add(mark, rows, {**PIXELS, **ENDS, **self.dimmed()})
 
     def crosses(self, rows: Iterable[Mapping[str, object]]) -> None:
@@ -209,9 +222,9 @@ def config(target: Target) -> Spec:
     }
 
 
-def about(name: str) -> Spec:
-    """What tells a row's method, to choose it and to draw it."""
-    found = look(name)
+def about(name: str, found: Look | None = None) -> Spec:
+    """What tells a row's method, to choose it and to draw it; `found` if not by its name."""
+    found = found or look(name)
     dash = list(found.dash) or [1, 0]
     return {
         "name": name,
@@ -226,17 +239,3 @@ def about(name: str) -> Spec:
 def raw(name: str) -> Spec:
     """A channel whose values are taken as they are."""
     return {"field": name, "type": "nominal", "scale": None, "legend": None}
-
-
-def flow(
-    entries: Sequence[Mapping[str, Any]], room: float, size: float, gap: float
-) -> list[tuple[float, int]]:
-    """Where entries stand that flow in rows: x and the row of each, by its `text`."""
-    places, x, row = [], 0.0, 0
-    for entry in entries:
-        needed = width(entry["text"], size) + 1.4 * size
-        if x > 0 and x + needed > room:
-            x, row = 0.0, row + 1
-        places.append((x, row))
-        x += needed + gap
-    return places

@@ -34,9 +34,9 @@ class Sizes:
 class Target(Enum):
     """A page, a phone, a column of a paper 3.3 in wide."""
 
-    PAGE = Sizes(584, 400, 12, 12, 70, 1.5, 74, 170)
-    PHONE = Sizes(352, 300, 11.5, 11.5, 50, 1.3, 62, 130)
-    PAPER = Sizes(237.6, 150, 7.5, 8, 22, 0.9, 44, 84)
+    PAGE = Sizes(584, 400, 12, 12, 70, 1.5, 74, 200)
+    PHONE = Sizes(352, 300, 11.5, 11.5, 50, 1.3, 62, 160)
+    PAPER = Sizes(237.6, 150, 7.5, 8, 22, 0.9, 44, 98)
 
     @property
     def sizes(self) -> Sizes:

@@ -133,11 +133,11 @@ def place(
         best = places[costs.index(min(costs))]
         x, y = _nearest(best, name)
         placed.append(Placed(name, best, hypot(x - name.x, y - name.y) > 2.2 * mark + 2))
-        boxes += [best, *_along(name.x, name.y, x, y)]
+        boxes += [best, *along(name.x, name.y, x, y)]
     return placed
 
 
-def _along(x: float, y: float, then_x: float, then_y: float, parts: int = 8) -> Iterator[Box]:
+def along(x: float, y: float, then_x: float, then_y: float, parts: int = 8) -> Iterator[Box]:
     """Small boxes that cover a leader."""
     for k in range(parts + 1):
         share = k / parts
@@ -181,32 +181,36 @@ def _nearest(box: Box, name: Name) -> tuple[float, float]:
     return min(max(name.x, box.left), box.right), min(max(name.y, box.top), box.bottom)
 
 
-def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:
-    """Heights in the same order, at least `apart`, between two ends if there is room.
+def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: float) -> list[float]:
+    """Middles of things of these sizes, one after the other, between two ends if there is room.
 
-    Each goes as near as can be to where it is wanted.
+    Each goes as near as can be to where it is wanted; they keep their order.
     """
     order = sorted(range(len(wanted)), key=lambda k: wanted[k])
     groups: list[list[int]] = []
-    middles: list[float] = []
     for k in order:
         groups.append([k])
-        middles.append(_held(wanted[k], 1, apart, low, high))
-        while (
-            len(groups) > 1
-            and middles[-1] - middles[-2] < apart * (len(groups[-1]) + len(groups[-2])) / 2
-        ):
+        while len(groups) > 1:
+            above, below = (_span(group, wanted, sizes, low, high) for group in groups[-2:])
+            if above[1] <= below[0]:
+                break
             groups[-2:] = [groups[-2] + groups[-1]]
-            mean = sum(wanted[j] for j in groups[-1]) / len(groups[-1])
-            middles[-2:] = [_held(mean, len(groups[-1]), apart, low, high)]
     found = [0.0] * len(wanted)
-    for group, middle in zip(groups, middles, strict=True):
-        for place_, k in enumerate(group):
-            found[k] = middle + apart * (place_ - (len(group) - 1) / 2)
+    for group in groups:
+        top, _ = _span(group, wanted, sizes, low, high)
+        for k in group:
+            found[k] = top + sizes[k] / 2
+            top += sizes[k]
     return found
 
 
-def _held(middle: float, count: int, apart: float, low: float, high: float) -> float:
-    """The middle of a group that stays between two ends."""
-    half = apart * (count - 1) / 2
-    return max(min(middle, high - half), low + half)
+def _span(
+    group: Sequence[int], wanted: Sequence[float], sizes: Sequence[float], low: float, high: float
+) -> tuple[float, float]:
+    """From where to where things reach that touch each other."""
+    before, tops = 0.0, []
+    for k in group:
+        tops.append(wanted[k] - before - sizes[k] / 2)
+        before += sizes[k]
+    top = max(min(sum(tops) / len(tops), high - before), low)
+    return top, top + before

@@ -10,11 +10,13 @@ from typing import Any
 import pandas as pd
 
 from strainbench.report.charts.axes import Axis, decades, length_tick, power_tick, time_axis
-from strainbench.report.charts.canvas import BAND, RAIL, RAIL_INK, SOFT, Plane, about, flow, raw
+from strainbench.report.charts.bands import QUESTION, name_band, question, unknown_band
+from strainbench.report.charts.canvas import Plane, about, raw
 from strainbench.report.charts.chart import Chart
+from strainbench.report.charts.rail import draw_rail, rail_height, why_failed
 from strainbench.report.charts.target import Target
-from strainbench.report.charts.text import Box, Name, Placed, place, width, wrapped
-from strainbench.report.measures import COUNT, OPTIMAL, OUT_OF_TIME, VIOLATED, duration, length
+from strainbench.report.charts.text import Box, Name, Placed, place
+from strainbench.report.measures import COUNT, OPTIMAL, duration, length
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits_of
 from strainbench.report.numbers import power
 from strainbench.report.table import UNCONSTRAINED
@@ -23,11 +25,8 @@ FIGURE = ["scenario", "mode", "exact", "steps_asked", "threads"]
 """What the panels of a figure share; they have their axes in common."""
 PANEL = ["mesh", "bound"]
 HEAD = "violates the limits (by), or out of time (steps done):"
-UNKNOWN = "below the reference's own error"
 FLOOR = 1e-9
 """Less, in mm or relative, is drawn at the lower edge, with an arrow and its value."""
-QUESTION = "question"
-"""The parameter {seconds, value} that frames what is both faster and more accurate; or null."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ ACCURACIES = {
 CAPTION = """\
 Time: median over the projections with active constraints, bars from the first to the third
 quartile. Filled: optimal on every step; hollow: within the limits, not optimal. Stair: what no
-method beats in both."""
+method beats in both. Grey: below the reference's own error."""
 
 
 def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance") -> list[Chart]:
@@ -73,7 +72,7 @@ def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance"
     """
     accuracy = ACCURACIES[against]
     methods = runs[runs["solver"] != UNCONSTRAINED]
-    methods = methods.assign(accuracy=accuracy.of(methods), label=_apart(methods))
+    methods = methods.assign(accuracy=accuracy.of(methods), label=labels(methods))
     replays_first = methods.sort_values("mode", key=lambda mode: mode != "replay", kind="stable")
     charts: list[Chart] = []
     for _, figure in replays_first.groupby(FIGURE, sort=False, dropna=False):
@@ -87,7 +86,7 @@ def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance"
     return charts
 
 
-def _apart(runs: pd.DataFrame) -> list[str]:
+def labels(runs: pd.DataFrame) -> list[str]:
     """What sets a scene's settings, mode and threads apart from those of the others."""
     settings = apart(runs, {*SPANNED, MESH_FILE, CURVE_FILE}, {"steps_asked": "{:.0f} steps"})
     several = [name for name in ("mode", "threads") if runs[name].nunique() > 1]
@@ -133,15 +132,8 @@ class Panel:
         return entries
 
     def rail(self) -> float:
-        """How high its rail is; 0 without failures."""
-        sizes = self.target.sizes
-        entries = self.failures()
-        if not entries:
-            return 0.0
-        plane = Plane(self.target, "", self.x, self.y)
-        head = wrapped(HEAD, plane.width - sizes.text, sizes.text)
-        rows = 1 + flow(entries, plane.width - sizes.text, sizes.text, sizes.text)[-1][1]
-        return (len(head) + rows) * ROW * sizes.text + 0.8 * sizes.text
+        """How high its rail is."""
+        return rail_height(self.failures(), HEAD, self.target)
 
     def chart(self, name: str, rail: float) -> Chart:
         """All of it."""
@@ -149,28 +141,10 @@ class Panel:
         if self.target.interactive:
             question(plane)
         band = unknown_band(plane, self.runs) if self.accuracy.scale != 1.0 else 0.0
-        self._draw_rail(plane)
+        draw_rail(plane, self.failures(), HEAD)
         self._draw_points(plane, band)
         params = [{"name": QUESTION, "value": None}] if self.target.interactive else []
         return Chart(name, self.title, self._caption(), plane.spec(params))
-
-    def _draw_rail(self, plane: Plane) -> None:
-        entries, size = self.failures(), self.target.sizes.text
-        if not plane.rail:
-            return
-        plane.box_layer(Box(0, -plane.rail, plane.width, 0), RAIL)
-        line, top = ROW * size, -plane.rail + 0.9 * size
-        head = wrapped(HEAD, plane.width - size, size)
-        texts = [{"px": size / 2, "py": top + k * line, "text": t} for k, t in enumerate(head)]
-        plane.texts([row | {"ink": RAIL_INK} for row in texts if entries])
-        places = flow(entries, plane.width - size, size, size)
-        first = top + len(head) * line
-        rows = [
-            entry | {"px": size + x, "py": first + row * line, "tx": 1.7 * size + x}
-            for entry, (x, row) in zip(entries, places, strict=True)
-        ]
-        plane.crosses(rows)
-        plane.texts([row | {"px": row["tx"]} for row in rows])
 
     def _draw_points(self, plane: Plane, band: float) -> None:
         points = [_point(run, self.accuracy, self.y.low) for _, run in self.counted.iterrows()]
@@ -191,7 +165,7 @@ class Panel:
         plane.add(mark, points, {**channels, **of_method, **look})
         taken = [*stair, *covered(plane, points)]
         if band:
-            taken.append(name_band(plane, band, taken))
+            taken += name_band(plane, band, taken)
         plane.names(place_names(plane, points, taken))
 
     def _caption(self) -> str:
@@ -207,7 +181,6 @@ class Panel:
         return f"{CAPTION} {'; '.join([said, *more])}.".replace("\n", " ")
 
 
-ROW = 1.35  # of a line in the rail, in its size
 TOOLTIP = [
     {"field": key, "type": "nominal", "title": title}
     for key, title in {
@@ -225,11 +198,7 @@ TOOLTIP = [
 
 def _why(run: pd.Series, several: bool) -> str:
     """In the rail, beside the name."""
-    why = run["why"]
-    if run["ending"] == VIOLATED:
-        why = why.removeprefix("violates ")
-    if run["ending"] == OUT_OF_TIME:
-        why = f"{run['done']:.0f}/{run['steps_asked']:.0f} steps"
+    why = why_failed(run)
     return f"at {run['tolerance']:g} {why}" if several else why
 
 
@@ -263,37 +232,6 @@ def front(points: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         if not kept or point["value"] < kept[-1]["value"]:
             kept.append(point)
     return kept
-
-
-def unknown_band(plane: Plane, runs: pd.DataFrame) -> float:
-    """Grey, below what the reference itself is known to; its height."""
-    error = 1000 * runs["reference_error_max"].replace(float("inf"), float("nan")).max()
-    if not error > plane.y.low:
-        return 0.0
-    _, y = plane.pixel(plane.x.low, error)
-    plane.box_layer(Box(0, max(y, 0), plane.width, plane.height), BAND)
-    return plane.height - max(y, 0)
-
-
-def name_band(plane: Plane, height: float, taken: Sequence[Box]) -> Box:
-    """What the band is, at its left where least is covered."""
-    size = plane.target.sizes.text
-    right, rows = width(UNKNOWN, size) + size, max(int(height / size / 0.8) - 1, 1)
-    middles = [plane.height - (0.9 + 0.8 * k) * size for k in range(rows)]
-    boxes = [Box(0, y - 0.7 * size, right, y + 0.7 * size) for y in middles]
-    best = min(boxes, key=lambda box: sum(box.shared(other) for other in taken))
-    where = {"px": 0.5 * size, "py": (best.top + best.bottom) / 2}
-    plane.texts([where | {"text": UNKNOWN, "ink": SOFT}])
-    return best
-
-
-def question(plane: Plane) -> None:
-    """The frame of what is both faster and more accurate than was asked for."""
-    across = f"clamp(scale('x', {QUESTION}.seconds), 0, width)"
-    down = f"clamp(scale('y', {QUESTION}.value), 0, height)"
-    box = {"x": 0, "x2": {"expr": f"{QUESTION} ? {across} : 0"}}
-    box |= {"y": {"expr": f"{QUESTION} ? {down} : height"}, "y2": {"expr": "height"}}
-    plane.add({"type": "rect", "color": "#FFF3C4", **box}, [{}], {})
 
 
 def covered(plane: Plane, points: Sequence[dict[str, Any]]) -> list[Box]:
