@@ -115,9 +115,7 @@ class Page:
     def faults(self) -> list[str]:
         """What the console said in anger, and exceptions."""
         self.run("1")  # events come before this answer
-        kinds = ("Runtime.exceptionThrown", "Runtime.consoleAPICalled", "Log.entryAdded")
-        mine = [e for e in self._events() if e["method"] in kinds]
-        return [json.dumps(e["params"])[:500] for e in mine if '"info"' not in json.dumps(e)]
+        return [json.dumps(e["params"])[:500] for e in self._events() if _is_fault(e)]
 
     def requests(self) -> list[str]:
         """Addresses that it asked for, itself and data apart."""
@@ -136,3 +134,16 @@ class Page:
     def close(self) -> None:
         """Be gone."""
         self.browser.call("Target.closeTarget", targetId=self.target)
+
+
+def _is_fault(event: dict) -> bool:
+    """An exception, or what the console or the browser calls an error; a warning is none."""
+    params = event["params"]
+    match event["method"]:
+        case "Runtime.exceptionThrown":
+            return True
+        case "Runtime.consoleAPICalled":
+            return params["type"] in ("error", "assert")
+        case "Log.entryAdded":
+            return params["entry"]["level"] == "error"
+    return False

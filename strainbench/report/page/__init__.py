@@ -50,7 +50,7 @@ def report_page(
     steps = numbers(newest_steps(folder, runs))
     found = with_cases(measured(runs, steps))
     failed = failures(folder, runs)
-    parts = sections(folder, found, failed, machines, track)
+    parts = sections(folder, found, steps, failed, machines, track)
     page: str = _template().render(
         title=folder.resolve().name,
         meta=_meta(found),

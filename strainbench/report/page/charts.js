@@ -31,7 +31,7 @@ function nextChart() {
 }
 
 async function drawChart(figure, spec) {
-  const { view } = await vegaEmbed(figure.querySelector(".plot"), spec, { renderer: "svg", actions: false });
+  const { view } = await vegaEmbed(figure.querySelector(".plot"), spec, { renderer: "svg", actions: false, logLevel: 1 });
   view.addEventListener("click", (event, item) => item?.datum?.cell && openDrawer(item.datum.cell));
   tell(view, "chosen", state.method);
   ask(view);

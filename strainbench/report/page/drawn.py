@@ -8,15 +8,21 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import pandas as pd
 
 from strainbench.progress import Track
 from strainbench.report.charts import Chart, Target, work_precision
+from strainbench.report.charts.convergence import convergence
+from strainbench.report.charts.energy import energy
+from strainbench.report.charts.growth import growth
+from strainbench.report.charts.profile import profiles
 from strainbench.report.page.races import CASE
 
 ACCURACIES = ("distance", "gap", "violation")
 PANEL = ["scenario", "mode", "exact", "steps_asked", "threads", "mesh", "bound"]
+LEAST = 1.0  # seconds of play: less tells nothing of energies
 MOST, FEW = 60, 12  # panels, each twice 50 kB and twice a tenth of a second
 TARGETS = {"page": Target.PAGE, "phone": Target.PHONE}
 KEYS = {"scene": "scene", "mode": "mode", "bound": "limit", "aim": "aim", "mesh": "size"}
@@ -86,6 +92,32 @@ def _largest(runs: pd.DataFrame, number: int) -> pd.DataFrame:
     """The rows of so many panels, those with most cells."""
     panel = runs.groupby(PANEL, dropna=False, sort=False).ngroup()
     return runs[panel.isin(panel.value_counts().index[:number])]
+
+
+def others(folder: Path, runs: pd.DataFrame, steps: pd.DataFrame) -> dict[str, list[Drawn]]:
+    """The charts of further sections."""
+    kept = _largest(runs, MOST)
+    kinds: dict[str, list[Callable[[Target], Sequence[Chart]]]] = {
+        "profile": [partial(profiles, runs, steps), partial(growth, runs)],
+        "convergence": [
+            partial(_convergence, folder),
+            lambda target: energy(folder, kept, target, LEAST),
+        ],
+    }
+    return {
+        section: [chart for draw in draws for chart in drawn(draw, runs)]
+        for section, draws in kinds.items()
+    }
+
+
+def _convergence(folder: Path, target: Target) -> list[Chart]:
+    """Of what `strainbench converge` wrote into the same folder."""
+    path = folder / "convergence.csv"
+    if not path.exists():
+        return []
+    table = pd.read_csv(path)
+    table["distance_mm"] = 1000 * table["distance"]
+    return [chart for chart in convergence(table, target) if "-seconds" in chart.name]
 
 
 def packed(charts: Iterable[Drawn]) -> str:

@@ -16,10 +16,11 @@ from strainbench.document import Items, Part, Picture, Prose, Table
 from strainbench.document.html import html
 from strainbench.progress import Track
 from strainbench.report import warm
+from strainbench.report.charts.profile import scores
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.machine import machine_section
-from strainbench.report.page.drawn import Drawn, speed
+from strainbench.report.page.drawn import Drawn, others, speed
 from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import OLDER, details, explanation, ledger_table, older, reasons
 
@@ -43,6 +44,7 @@ class Section:
 def sections(
     folder: Path,
     runs: pd.DataFrame,
+    steps: pd.DataFrame,
     failed: pd.DataFrame,
     machines: Machines,
     track: Track,
@@ -51,6 +53,7 @@ def sections(
     first = runs.iloc[0]
     signs = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
     charts, left_out = speed(runs, track)
+    further = others(folder, runs, steps)
     every = [
         Section(
             "speed",
@@ -69,6 +72,14 @@ def sections(
             body=html(warm.table(runs), 3),
         ),
         Section(
+            "profile",
+            "Profile and growth",
+            "In how many cases a method is within a factor of the fastest; how its time grows "
+            "with the number of unknowns.",
+            further["profile"],
+            body=Markup().join(html(table, 3) for table in scores(runs, steps)),
+        ),
+        Section(
             "failures",
             "Where methods fail",
             "A square says what was found, what an easier neighbour gave, and whose fault it is.",
@@ -84,6 +95,7 @@ def sections(
             "convergence",
             "Convergence and energy",
             "How far an answer is from the optimum as time goes on; what happens to the energy.",
+            further["convergence"],
             body=_folded("Energies in numbers", [energy_table(folder, runs)]),
         ),
         Section("pictures", "Pictures", "Of the scenes.", body=_pictures(folder)),
