@@ -58,7 +58,7 @@ def write_report(folder: Path, track: Track = untracked) -> list[Path]:
     if (energy := energy_table(folder, runs)).lines:
         texts["energy.md"] = markdown(energy)
     files = [*texts, *(path.name for path in charts)]
-    texts["index.html"] = report_page(folder, runs, machines, files, track)
+    texts["index.html"] = report_page(folder, runs, failed, machines, files, track)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return [*(folder / name for name in texts), *charts]

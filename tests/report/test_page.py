@@ -192,6 +192,7 @@ def test_filters_hold_together_and_stay_in_the_hash(page, browser, field):
     assert {(cell["size"], cell["ending"]) for cell in left} == {("20×20", "feasible")}
     hash_ = page.run("location.hash")
     again = browser.open(field / "index.html", hash_=hash_)
+    again.until(DRAWN)
     assert rows_of(again) == rows_of(page)
     again.close()
     page.run("document.querySelector('#filters button').click()")
@@ -259,6 +260,7 @@ def test_nothing_is_wider_than_the_window_and_no_text_too_small(browser, field, 
 
 def opened(browser, path):
     shown = browser.open(path)
+    shown.until("document.body.dataset.drawn !== undefined")
     assert shown.faults() == []
     return shown, " ".join(shown.run("document.querySelector('main').innerText").split())
 

@@ -13,12 +13,10 @@ from markupsafe import Markup
 from strainbench.document import Strong
 from strainbench.escape import plain
 from strainbench.progress import Track, untracked
-from strainbench.report.failures import failures
 from strainbench.report.identity import look
 from strainbench.report.measures import OPTIMAL, measured, numbers
 from strainbench.report.names import percent
 from strainbench.report.page import data
-from strainbench.report.page.drawn import packed
 from strainbench.report.page.headline import headline
 from strainbench.report.page.races import CASE, with_cases
 from strainbench.report.page.sections import Section, sections
@@ -28,6 +26,12 @@ from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
 
 HERE = Path(__file__).parent
+READ = (
+    *("cell", "step", "projection", "outcome", "status", "seconds", "active_constraints"),
+    *("max_violation", "relative_gap", "distance", "contact_energy"),
+    *("seconds_low", "seconds_high", "seconds_each"),
+)
+"""Columns of steps that the page is about; further ones would cost time."""
 BLOCK = list(CASE[:-1])
 SCRIPTS = ("parts.js", "drawer.js", "answer.js", "tables.js", "charts.js", "page.js")
 Machines = Mapping[str, Mapping[str, object]]
@@ -36,6 +40,7 @@ Machines = Mapping[str, Mapping[str, object]]
 def report_page(
     folder: Path,
     runs: pd.DataFrame,
+    failed: pd.DataFrame,
     machines: Machines,
     files: Sequence[str],
     track: Track = untracked,
@@ -45,11 +50,12 @@ def report_page(
     Parameters
     ----------
     runs : as `strainbench.report.load_runs` has them
+    failed : as `strainbench.report.failures.failures` has it
     files : names of what else was written, to be linked
     """
-    steps = numbers(newest_steps(folder, runs))
+    steps = newest_steps(folder, runs)
+    steps = numbers(steps[[name for name in READ if name in steps]])
     found = with_cases(measured(runs, steps))
-    failed = failures(folder, runs)
     parts = sections(folder, found, steps, failed, machines, track)
     page: str = _template().render(
         title=folder.resolve().name,
@@ -64,7 +70,13 @@ def report_page(
         style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
         vega=Markup(vega_script()),
         script=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)),
-        charts=packed(chart for part in parts for chart in part.charts),
+        packed=data.packed(
+            {
+                "specs": {chart.name: chart.specs for part in parts for chart in part.charts},
+                "records": data.records(found),
+                "steps": data.step_lists(steps),
+            }
+        ),
         records=Markup(data.as_json(_payload(folder, found, steps, failed, parts))),
     )
     return page
@@ -85,8 +97,6 @@ def _payload(
         "folder": plain(folder),
         "alone": UNCONSTRAINED,
         "cells": data.cells(runs, steps),
-        "records": data.records(runs),
-        "steps": data.step_lists(steps),
         "failures": data.failed_lists(failed, runs),
         "methods": {name: data.looks(name) for name in methods},
         "families": data.families(methods),

@@ -1,7 +1,6 @@
 // Charts, drawn one after the other while nothing else is to do; anew where the page's shape changes.
 const drawn = new Map(); // names and views
 const narrow = matchMedia("(max-width: 700px)");
-const specs = unpacked(byId("charts").textContent);
 let drawing = false;
 
 function unpacked(text) {
@@ -16,7 +15,7 @@ async function drawCharts() {
   for (let figure = nextChart(); figure; figure = nextChart()) {
     const name = figure.dataset.chart;
     const target = narrow.matches ? "phone" : "page";
-    drawn.set(name, { target, view: await drawChart(figure, (await specs)[name][target]) });
+    drawn.set(name, { target, view: await drawChart(figure, data.specs[name][target]) });
     await new Promise((done) => setTimeout(done));
   }
   drawing = false;

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 from collections.abc import Iterable, Sequence
 from math import isfinite, isnan
@@ -45,6 +47,12 @@ def as_json(value: object) -> str:
     """To stand in a script element, whatever it holds."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", r"\u003c")
+
+
+def packed(value: object) -> str:
+    """As JSON, but a tenth as long: gzip in base64."""
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
 def cells(runs: pd.DataFrame, steps: pd.DataFrame) -> list[dict[str, object]]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,7 +21,7 @@ from strainbench.report.page.races import CASE
 ACCURACIES = ("distance", "gap", "violation")
 PANEL = ["scenario", "mode", "exact", "steps_asked", "threads", "mesh", "bound"]
 LEAST = 1.0  # seconds of play: less tells nothing of energies
-MOST, FEW = 60, 12  # panels, each twice 50 kB and twice a tenth of a second
+MOST, FEW = 40, 12  # panels, each twice 50 kB and twice a tenth of a second
 TARGETS = {"page": Target.PAGE, "phone": Target.PHONE}
 KEYS = {"scene": "scene", "mode": "mode", "bound": "limit", "aim": "aim", "mesh": "size"}
 """What the page calls the columns of a case."""
@@ -98,7 +96,7 @@ def others(folder: Path, runs: pd.DataFrame, steps: pd.DataFrame) -> dict[str, l
     """The charts of further sections."""
     kept = _largest(runs, MOST)
     kinds: dict[str, list[Callable[[Target], Sequence[Chart]]]] = {
-        "profile": [partial(profiles, runs, steps), partial(growth, runs)],
+        "profile": [partial(profiles, runs, steps), partial(growth, kept)],
         "convergence": [
             partial(_convergence, folder),
             lambda target: energy(folder, kept, target, LEAST),
@@ -118,9 +116,3 @@ def _convergence(folder: Path, target: Target) -> list[Chart]:
     table = pd.read_csv(path)
     table["distance_mm"] = 1000 * table["distance"]
     return [chart for chart in convergence(table, target) if "-seconds" in chart.name]
-
-
-def packed(charts: Iterable[Drawn]) -> str:
-    """All specifications as JSON, a tenth as long: gzip in base64."""
-    text = json.dumps({chart.name: chart.specs for chart in charts}, allow_nan=False)
-    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()

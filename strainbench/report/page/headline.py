@@ -123,10 +123,12 @@ def _alone(found: Sequence[Race]) -> str:
         time = f"{duration(row['time'])} a projection at " if known else "at "
         what = SAID.get(row["ending"], f"gives no answer to the end ({row['why']})")
         said.setdefault(what, []).append(f"{time}{race.place}")
-    where = {
-        what: f"in {count(len(places))} of {len(found)} cases"
-        if len(found) > MOST
-        else listed(places)
-        for what, places in said.items()
-    }
+    where = {what: _where(places, len(found)) for what, places in said.items()}
     return f" {'; '.join(f'{what}: {places}' for what, places in where.items())}."
+
+
+def _where(places: Sequence[str], total: int) -> str:
+    """The places themselves, or how many they are."""
+    if total <= MOST:
+        return listed(places)
+    return f"in all {total} cases" if len(places) == total else f"in {len(places)} of {total} cases"

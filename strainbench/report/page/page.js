@@ -47,14 +47,15 @@ function filters() {
     const change = (event) => { choose({ [name]: event.target.value }); refresh(); };
     byId("filters").append(el("select", { name, "aria-label": labels[name] ?? name, onchange: change }, all, ...each));
   }
-  byId("filters").append(el("button", { type: "button", onclick: () => { choose(Object.fromEntries([...FILTERS, "method"].map((name) => [name, ""]))); refresh(); dim(); } }, "Show everything"));
+  byId("filters").append(el("button", { type: "button", onclick: () => { choose(Object.fromEntries([...FILTERS, "method"].map((name) => [name, ""]))); refresh(); dim(); } }, `Show all ${data.blocks.length > 1 ? `${data.blocks.length} tables` : "cells"}`));
 }
 
 function accuracies() {
   const change = (event) => { choose({ against: event.target.value }); refresh(); };
   const radio = ([value, text]) =>
     el("label", {}, el("input", { type: "radio", name: "against", value, checked: value === against() && "", onchange: change }), ` ${text}`);
-  byId("against")?.append("Accuracy: ", ...Object.entries(AGAINST).map(radio));
+  const drawnAgainst = new Set(Object.values(data.charts).map((chart) => chart.against));
+  if (drawnAgainst.has("gap")) byId("against").append("Accuracy: ", ...Object.entries(AGAINST).map(radio));
 }
 
 function chips() {
@@ -101,7 +102,8 @@ function links() {
   byId("records-csv")?.addEventListener("click", () => download("runs.csv", asCsv()));
 }
 
-function begin() {
+async function begin() {
+  Object.assign(data, await unpacked(byId("packed").textContent)); // specs, records, steps
   document.querySelectorAll("main table").forEach(makeSortable);
   readHash();
   chips();

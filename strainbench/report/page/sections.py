@@ -22,10 +22,17 @@ from strainbench.report.failures import EXPLANATION
 from strainbench.report.machine import machine_section
 from strainbench.report.page.drawn import Drawn, others, speed
 from strainbench.report.sweep import BEYOND, sweep_tables
-from strainbench.report.table import OLDER, details, explanation, ledger_table, older, reasons
+from strainbench.report.table import LOCAL, OLDER, details, ledger_table, older, reasons
 
 OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md"}
 HEAVY = 1_500_000  # bytes of a folder's pictures that stand in the page; the others are linked
+NOTE = """\
+✓ optimal on every step (violation at most {violation}, relative gap at most {gap}); ○ within the
+limits on every step, not optimal; ✗ a limit violated, out of time or no answer. Time: the median
+over projections with active constraints, inside the solver, set-up apart, with first and third
+quartile; beside it, in the list of cells, the mean over all steps, those included in which nothing
+had to move. Distance, violation and gap: the worst step; `<` stands before the reference's own
+error where a distance is smaller."""
 Machines = Mapping[str, Mapping[str, object]]
 
 
@@ -69,7 +76,7 @@ def sections(
             "Bold is the fastest method that is optimal on every step. Grey numbers belong to runs "
             "that do not count: they violate or did not finish. A row opens its record.",
             boxes=("table1", "cells"),
-            body=html(warm.table(runs), 3),
+            body=_note(runs) + html(warm.table(runs), 3),
         ),
         Section(
             "profile",
@@ -109,6 +116,14 @@ def sections(
     return [part for part in every if part.charts or part.boxes or part.body]
 
 
+def _note(runs: pd.DataFrame) -> Markup:
+    """What the signs and numbers of the tables are."""
+    first = runs.iloc[0]
+    local = runs["max_violation"].notna() & runs["relative_gap_max"].isna()
+    note = NOTE.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
+    return html(Prose(note + LOCAL * bool(local.any())))
+
+
 def _signs(failed: pd.DataFrame, signs: str) -> Markup:
     return html(Prose(signs.replace("\n\n", " "))) if len(failed) else Markup()
 
@@ -125,7 +140,6 @@ def _protocol(folder: Path, runs: pd.DataFrame, machines: Machines) -> Markup:
     kept = reasons(runs)
     return Markup().join(
         [
-            html(Prose(explanation(runs))),
             html(Items(older(runs), Prose(OLDER))),
             html(machine_section(machines), 3),
             _folded(kept.title, kept.parts),
