@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle
 from pathlib import Path
 from textwrap import wrap
 
@@ -21,7 +20,7 @@ from strainbench.escape import chart
 from strainbench.problem.kinds import Limits, Sampled, kind_of
 from strainbench.problem.problem import Problem
 from strainbench.render.film import Film, Track, shoot, untracked
-from strainbench.report.chart import COLOURS
+from strainbench.report.identity import look
 
 SUFFIXES = (".svg", ".png", ".pdf")
 ANGLES = np.pi * np.arange(180) / 180 - np.pi / 2
@@ -126,8 +125,8 @@ def draw_polar(films: Sequence[Film], curve: tuple[FloatArray, FloatArray] | Non
     strains = [_strains(film) for film in films]
     _draw_limits(ax, limits, curve)
     top = _top(limits, strains)
-    for film, strain, colour in zip(films, strains, cycle(COLOURS)):
-        _draw_film(ax, film, strain, colour, top)
+    for film, strain in zip(films, strains, strict=True):
+        _draw_film(ax, film, strain, look(film.solver).colour, top)
     _axes(ax, strains, top)
     figure.legend(
         loc="center left", bbox_to_anchor=(0.65, 0.46), frameon=False, fontsize=9, labelspacing=0.7

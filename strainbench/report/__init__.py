@@ -11,12 +11,14 @@ from strainbench.bench.records import RecordsError, read_machines
 from strainbench.document import Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.progress import Track, untracked
-from strainbench.report.chart import speed_accuracy
-from strainbench.report.energy import draw_energy, energy_table
+from strainbench.report.charts import draw_charts
+from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
+from strainbench.report.measures import measured
 from strainbench.report.names import with_names
 from strainbench.report.page import report_page
-from strainbench.report.sweep import BEYOND, draw_sweeps, sweep_tables
+from strainbench.report.steps import newest_steps
+from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import as_latex, as_markdown, tidy
 from strainbench.report.versions import shown_runs
 
@@ -42,8 +44,8 @@ def write_report(folder: Path, track: Track = untracked) -> list[Path]:
     """Write table1.csv, .md, .tex, what else there is to tell, the charts and index.html."""
     runs = load_runs(folder)
     machines = read_machines(folder)
-    charts = speed_accuracy(runs, folder / "speed-accuracy") + draw_energy(folder, runs)
-    charts += draw_sweeps(folder, runs)
+    steps = newest_steps(folder, runs)
+    charts = draw_charts(folder, measured(runs, steps), steps)
     texts = {
         "table1.csv": csv(Table.of(tidy(runs))),
         "table1.md": as_markdown(runs, machines),

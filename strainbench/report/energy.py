@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from strainbench import escape
 from strainbench.document import Column, Prose, Table
-from strainbench.report.chart import COLOURS, save
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits, settings
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
@@ -27,13 +22,11 @@ PARTS = [
 ]
 IN_NAMES = {*SPANNED, MESH_FILE, CURVE_FILE, "step", "integrator"}
 """Settings that panels and curves are called by anyway."""
-DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)))
 EXPLANATION = """\
 After each step. Energy above that of the first steps is a sign of instability; a run that comes to
 rest has a small range in its last quarter."""
 NUMBERS = {"time": "s", "first": "mJ", "highest": "", "last": "", "range in the last quarter": ""}
 """Columns with their units."""
-LOW = 2.0  # times the loss of the runs that lose energy: how far below the start the axis goes
 ENDED = "ended after"  # in the names of runs without an answer to the end
 
 
@@ -108,44 +101,3 @@ def energy_table(folder: Path, runs: pd.DataFrame) -> Table:
         lines.append([first["panel"], first["curve"], len(run), run["time"].max(), *values])
     numbers = [Column(name, unit, ".4g") for name, unit in NUMBERS.items()]
     return Table("Total energy", ["scene", "run", "steps", *numbers], lines, Prose(EXPLANATION))
-
-
-def draw_energy(folder: Path, runs: pd.DataFrame) -> list[Path]:
-    """energy.svg and .png, one panel a scene, resolution and limit; nothing without energies."""
-    table = energies(folder, runs)
-    if table.empty:
-        return []
-    panels = list(dict.fromkeys(table["panel"]))
-    looks = _looks(list(dict.fromkeys(table["curve"])))
-    height = max(0.6 + 3.2 * len(panels), 0.6 + 0.2 * len(looks))
-    figure = Figure(figsize=(9.5, height), layout="constrained")
-    for ax, panel in zip(figure.subplots(len(panels), squeeze=False)[:, 0], panels, strict=True):
-        shown = table[table["panel"] == panel]
-        for _, line in shown.groupby("cell", sort=False):
-            curve, energy = line["curve"].iloc[0], 1000 * line["energy"]
-            ax.plot(line["time"], energy, **looks[curve])
-            if ENDED in curve or len(line) == 1:
-                ax.plot(line["time"].iloc[-1], energy.iloc[-1], "x", color=looks[curve]["color"])
-        start = 1000 * float(shown.groupby("cell")["energy"].first().max())
-        lowest = 1000 * float(shown.groupby("cell")["energy"].min().median())
-        drop = max(start - lowest, 1e-9)
-        ax.set_ylim(start - LOW * drop, start + drop)
-        ax.set_title(escape.chart(panel), size=10)
-        ax.set_xlabel("time [s]")
-        ax.set_ylabel("total energy [mJ]")
-        ax.grid(visible=True, color="#dddddd", linewidth=0.6)
-    handles = [Line2D([], [], label=escape.chart(curve), **look) for curve, look in looks.items()]
-    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9)
-    return save(figure, folder / "energy")
-
-
-def _looks(curves: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """A colour and dashes for each curve, the same in all panels."""
-    return {
-        curve: {
-            "color": COLOURS[k % len(COLOURS)],
-            "linestyle": DASHES[k // len(COLOURS) % len(DASHES)],
-            "linewidth": 1.4,
-        }
-        for k, curve in enumerate(curves)
-    }

@@ -124,7 +124,7 @@ def _cause(reason: str) -> str:
 
 
 def measured(runs: pd.DataFrame, steps: pd.DataFrame) -> pd.DataFrame:
-    """Runs with the columns NEW; a cell without steps has its row's own median time.
+    """Runs with the columns NEW; a cell without steps has its row's own time.
 
     Parameters
     ----------
@@ -140,7 +140,8 @@ def _measures(run: pd.Series, steps: pd.DataFrame) -> tuple[object, ...]:
     """The entries of NEW."""
     end, time = finish(run, steps), timing(steps)
     if steps.empty:
-        time = Quartiles.of([run["solve_seconds_median"]])._replace(n=0)
+        own = run[["solve_seconds_median", "solve_seconds_mean"]].dropna()
+        time = Quartiles.of(own[:1])._replace(n=0)
     return (end.ending, end.done, end.why, *time)
 
 

@@ -3,35 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
 
-from strainbench import escape
 from strainbench.document import Column, Table
-from strainbench.report.chart import CERTIFIED, FLOOR_MM, draw_certified, save, styles
 from strainbench.report.names import describe, digits, digits_of, settings
 from strainbench.report.table import ACCURACY, UNCONSTRAINED, accuracy_text, time_text
 
 FEWEST = 3  # values of a setting that make a sweep
 APART = 1.6  # times the largest number: where a chart has the words among the values
-PANELS = (
-    "seconds a projection",
-    "distance to optimum [mm]",
-    "largest principal stretch\nbeyond the limit",
-)
 LINE = ["scenario", "rest", "mode", "tolerance", "steps"]
-POINT: dict[str, Any] = {"markersize": 5, "linewidth": 1.2}
-ROOM = 24  # characters of all ticks beside each other
-BAND = 0.15  # of a panel's height
-FLOOR = 1e-9  # of stretch beyond the limit: less is drawn here
 BEYOND = """\
 `beyond`: the largest principal stretch of any triangle less 1 + limit. Sampled directions let the
 true stretch go further between them; `exact` limits the principal stretch itself."""
@@ -100,101 +81,13 @@ def _table(key: str, group: pd.DataFrame, rows: pd.DataFrame) -> Table:
     return Table(f"{first['scenario']} against {key} ({about})", header, lines)
 
 
-def draw_sweeps(folder: Path, runs: pd.DataFrame) -> list[Path]:
-    """sweep-<setting>.svg and .png: seconds, distance, true stretch against each setting."""
-    paths = []
-    for key, rows in sweeps(runs).items():
-        figure = Figure(figsize=(13, 3.6), layout="constrained")
-        axes = figure.subplots(1, 3)
-        lines = list(rows.groupby(["solver", "line"], sort=False))
-        style = styles([f"{solver} {line}" for (solver, line), _ in lines])
-        for ax, name in zip(axes, PANELS, strict=True):
-            _axes(ax, rows, key, name)
-        handles = []
-        for number, ((solver, line), cells) in enumerate(lines, start=1):
-            look = style[f"{solver} {line}"]
-            _draw_line(axes, cells, look, 1 - BAND * number / (1 + len(lines)))
-            label = escape.chart(", ".join([solver, *_differs(cells.iloc[0], rows)]))
-            handles.append(Line2D([], [], label=label, **POINT, **look))
-        if (rows["outcome"] == "no answer").any():
-            for ax in axes:
-                _band(ax)
-        if (rows["outcome"] == "violated").any():
-            hollow: dict[str, Any] = {
-                "label": "violates the limits",
-                "marker": "o",
-                "color": "#777777",
-            }
-            handles.append(Line2D([], [], linestyle="none", fillstyle="none", **hollow, **POINT))
-        certified = {"label": "reference certified to", **POINT, **CERTIFIED, "markersize": 10}
-        handles.append(Line2D([], [], **certified))
-        figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=8)
-        paths += save(figure, folder / f"sweep-{key}")
-    return paths
-
-
-def _axes(ax: Axes, rows: pd.DataFrame, key: str, name: str) -> None:
-    """Scales, ticks at the values, labels."""
-    ax.set_yscale("log")
-    if rows["value"].min() > 0 and rows["value"].max() > 8 * rows["value"].min():
-        ax.set_xscale("log")
-    ticks = rows.drop_duplicates("value")
-    crowded = ticks["shown"].str.len().sum() > ROOM
-    slant: dict[str, Any] = {"rotation": 40, "ha": "right", "rotation_mode": "anchor"}
-    ax.set_xticks(
-        ticks["value"],
-        [escape.chart(v) for v in ticks["shown"]],
-        size=8,
-        **(slant if crowded else {}),
-    )
-    ax.xaxis.minorticks_off()
-    everywhere = ax.get_xaxis_transform()  # so that all panels have the same values
-    ax.plot(ticks["value"], [0.5] * len(ticks), alpha=0, transform=everywhere)
-    ax.set_xlabel(key)
-    ax.set_ylabel(name)
-    ax.grid(visible=True, color="#dddddd", linewidth=0.6)
-
-
-def _draw_line(
-    axes: Sequence[Axes], cells: pd.DataFrame, look: dict[str, Any], height: float
-) -> None:
-    """One method in the three panels: in the band, at `height`, where it has no answer, the line
-    broken there; hollow where it violates the limits."""
-    value, outcome = cells["value"], cells["outcome"]
-    measures = (
-        cells["solve_seconds_mean"],
-        (1000 * cells["distance_max"]).clip(lower=FLOOR_MM),
-        beyond(cells).clip(lower=FLOOR),
-    )
-    point = {**POINT, **look, "linestyle": "none"}
-    for _, row in cells[outcome != "no answer"].iterrows():
-        draw_certified(axes[1], row["value"], row, look["color"])
-    for ax, measure in zip(axes, measures, strict=True):
-        known = measure.replace(np.inf, np.nan).mask(outcome == "no answer")
-        ax.plot(value, known, color=look["color"], linewidth=1.2)
-        ax.plot(value, known.mask(outcome == "violated"), **point)
-        ax.plot(value, known.where(outcome == "violated"), **point, fillstyle="none")
-        failed = value[outcome == "no answer"]
-        across = ax.get_xaxis_transform()
-        ax.plot(failed, [height] * len(failed), **point, fillstyle="none", transform=across)
-
-
-def _band(ax: Axes) -> None:
-    """The upper part of a panel, for cells without an answer."""
-    bottom, top = ax.get_ylim()
-    ax.set_ylim(bottom, top * (top / bottom) ** (BAND / (1 - BAND)))
-    across: dict[str, Any] = {"color": "#eeeeee", "zorder": 0, "transform": ax.transAxes}
-    ax.add_patch(Rectangle((0, 1 - BAND), 1, BAND, **across))
-    ax.text(0.02, 0.98, "no answer", transform=ax.transAxes, va="top", size=8, color="#555555")
-
-
 def _how(row: pd.Series, rows: pd.DataFrame) -> list[str]:
     """What of its tolerance and steps sets a line apart from the others of its sweep."""
     tolerance = [f"tolerance {row['tolerance']:g}"] if rows["tolerance"].nunique() > 1 else []
     return tolerance + ([f"{row['steps']:.0f} steps"] if rows["steps"].nunique() > 1 else [])
 
 
-def _differs(row: pd.Series, rows: pd.DataFrame) -> list[str]:
+def differs(row: pd.Series, rows: pd.DataFrame) -> list[str]:
     """The same of all that may set it apart."""
     words = [row[name] for name in ("scenario", "mode") if rows[name].nunique() > 1]
     every = [settings(text) for text in rows["rest"].unique()]

@@ -129,3 +129,8 @@ def count_tick(value: float) -> str:
         if value >= 1e3
         else f"{value:g}"
     )
+
+
+def percent_tick(value: float) -> str:
+    """Of a number in per cent."""
+    return f"{value:.10g}%"

@@ -19,12 +19,14 @@ class Chart:
     name : of its file, and of its place on a page
     title : stands above it as well
     caption : how to read it, and what is not drawn
+    figure : the file of those beside which it stands, as they have their axes in common
     """
 
     name: str
     title: str
     caption: str
     spec: dict[str, Any]
+    figure: str = ""
 
 
 ENDINGS = (".svg", ".pdf", ".png")
@@ -40,23 +42,23 @@ def draw(chart: Chart, path: Path) -> None:
     ValueError
         For a name with another ending.
     """
-    draw_sheet([chart], path)
+    draw_sheet([chart], [path])
 
 
-def draw_sheet(charts: Sequence[Chart], path: Path, columns: int = 3) -> None:
-    """Write several charts as one picture, side by side in rows; see `draw`."""
+def draw_sheet(charts: Sequence[Chart], paths: Sequence[Path], columns: int = 3) -> None:
+    """Write several charts as one picture, side by side in rows, in each form; see `draw`."""
     import vl_convert
 
-    if path.suffix not in ENDINGS:
-        raise ValueError(f"{path}: a name that ends in {', '.join(ENDINGS)} is valid")
+    if wrong := [path for path in paths if path.suffix not in ENDINGS]:
+        raise ValueError(f"{wrong[0]}: a name that ends in {', '.join(ENDINGS)} is valid")
     found = [vl_convert.vegalite_to_svg(chart.spec, allowed_base_urls=[]) for chart in charts]
     svg = found[0] if len(found) == 1 else _together(found, columns)
-    match path.suffix:
-        case ".svg":
+    for path in paths:
+        if path.suffix == ".svg":
             path.write_text(svg, encoding="utf-8")
-        case ".pdf":
+        elif path.suffix == ".pdf":
             path.write_bytes(vl_convert.svg_to_pdf(svg))
-        case ".png":
+        else:
             path.write_bytes(vl_convert.svg_to_png(svg, scale=SHARP))
 
 

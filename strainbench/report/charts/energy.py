@@ -7,18 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from pandas.api.typing import SeriesGroupBy
 
 from strainbench.report.charts.axes import Axis, even_ticks
 from strainbench.report.charts.canvas import Spec, about
 from strainbench.report.charts.chart import Chart
 from strainbench.report.charts.curves import Curve, Curves, point
 from strainbench.report.charts.target import Target
+from strainbench.report.charts.text import HELD
 from strainbench.report.energy import energies
 from strainbench.report.identity import integrator_look, look
 from strainbench.report.names import settings
 from strainbench.report.table import UNCONSTRAINED
 
 LOW = 2.0  # times the loss of the runs that lose energy: how far below the start the axis goes
+EDGE = 0.04  # of the axis, beyond the highest and the lowest
 MOST = 400  # points of a line
 HEAD = "energy beyond the plane:"
 CAPTION = """\
@@ -41,10 +44,7 @@ def energy(folder: Path, runs: pd.DataFrame, target: Target, least: float = 0.0)
 
 def _chart(name: str, panel: str, rows: pd.DataFrame, target: Target) -> Chart:
     rows = rows.assign(energy=1000 * rows["energy"])
-    by_cell = rows.groupby("cell")["energy"]
-    start, lowest = float(by_cell.first().max()), float(by_cell.min().median())
-    drop = max(start - lowest, 1e-9)
-    low, high = start - LOW * drop, start + drop
+    low, high = _span(rows.groupby("cell")["energy"])
     x = Axis("time [s]", 0.0, float(rows["time"].max()), even_ticks(0, rows["time"].max()), False)
     y = Axis("total energy [mJ]", low, high, even_ticks(low, high), False)
     names, alike = _short(rows)
@@ -54,7 +54,7 @@ def _chart(name: str, panel: str, rows: pd.DataFrame, target: Target) -> Chart:
         beyond = line[line["energy"] > high]
         curves.append(Curve(found | {"line": label}, "" if len(beyond) else label, _points(line)))
         if len(beyond):
-            text = f"{label} blows up at {beyond['time'].iloc[0]:.2g} s"
+            text = f"{label}: blows up at {beyond['time'].iloc[0]:.2g} s"
             failures.append(found | {"text": text})
     spec = Curves(
         f"Total energy: {', '.join([panel, *alike])}",
@@ -74,10 +74,20 @@ def _short(rows: pd.DataFrame) -> tuple[dict[str, str], list[str]]:
     parts = [str(name).split(", ") for name in limited]
     alike = [p for p in (parts[0][1:] if len(parts) > 1 else []) if all(p in q for q in parts)]
     short = {
-        str(name): ", ".join(p for p in str(name).split(", ") if p not in alike) or str(name)
+        str(name): ", ".join(p.replace(" ", HELD) for p in str(name).split(", ") if p not in alike)
+        or str(name)
         for name in rows["curve"].unique()
     }
     return short, alike
+
+
+def _span(energies_: SeriesGroupBy) -> tuple[float, float]:
+    """Where the axis begins and ends: with all runs on it but those that blow up or fall away."""
+    start, lowest = float(energies_.first().median()), float(energies_.min().median())
+    drop = max(start - lowest, 1e-9)
+    low = max(float(energies_.min().min()), start - LOW * drop)
+    high = min(float(energies_.max().max()), start + drop)
+    return low - EDGE * (high - low) - 1e-9, high + EDGE * (high - low) + 1e-9
 
 
 def _points(line: pd.DataFrame) -> list[Spec]:

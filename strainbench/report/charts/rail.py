@@ -42,12 +42,10 @@ def draw_rail(plane: Plane, entries: Sequence[Mapping[str, Any]], head: str) -> 
     ----------
     entries : with a `text`, and what `strainbench.report.charts.canvas.about` says of a method
     """
-    if not plane.rail:
+    if not entries:  # the room may be kept for those of a panel beside
         return
     size = plane.target.sizes.text
     plane.box_layer(Box(0, -plane.rail, plane.across, 0), GROUND)
-    if not entries:
-        return
     line, top = ROW * size, -plane.rail + 0.9 * size
     lines = wrapped(head, plane.across - size, size)
     said = [{"px": size / 2, "py": top + k * line, "text": t} for k, t in enumerate(lines)]

@@ -23,22 +23,30 @@ WIDTHS = (
 """Of Helvetica's characters from the space to the tilde, in thousandths of its size; Arial and
 Liberation Sans have the same."""
 OTHER = 600
+HELD = "\u00a0"
 BOLD = 1.07  # times as wide, about
 HEIGHT = 1.15  # of a line, in its size
 RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0, 10.0)
 DIRECTIONS = 16
+FEW = 12  # of the cheapest places, for which leaders are looked at
+CROSSED = 25.0
 
 
 def width(text: str, size: float) -> float:
     """Of a line of text."""
-    known = (WIDTHS[ord(c) - 32] if 32 <= ord(c) < 127 else OTHER for c in text)
+    known = (WIDTHS[ord(c) - 32] if 32 <= ord(c) < 127 else OTHER for c in plain(text))
     return sum(known) * size / 1000
+
+
+def plain(text: str) -> str:
+    """With spaces in place of those at which a line never breaks."""
+    return text.replace(HELD, " ")
 
 
 def wrapped(text: str, room: float, size: float) -> list[str]:
     """Lines of whole words, each at most so wide where its words are."""
     lines = [""]
-    for word in text.split():
+    for word in text.split(" "):
         longer = f"{lines[-1]} {word}".strip()
         if lines[-1] and width(longer, size) > room:
             lines.append(word)
@@ -129,8 +137,9 @@ def place(
     boxes, placed = list(taken), []
     for name in names:
         places = list(_places(name, size, mark))
-        costs = _costs(places, name, boxes, plane)
-        best = places[costs.index(min(costs))]
+        ranked = sorted(zip(_costs(places, name, boxes, plane), range(len(places)), strict=True))
+        few = [(cost, places[k]) for cost, k in ranked[:FEW]]
+        best = min(few, key=lambda c: c[0] + CROSSED * _crossed(c[1], name, boxes, mark))[1]
         x, y = _nearest(best, name)
         placed.append(Placed(name, best, hypot(x - name.x, y - name.y) > 2.2 * mark + 2))
         boxes += [best, *along(name.x, name.y, x, y)]
@@ -175,6 +184,13 @@ def _covered(places: Sequence[Box], taken: Sequence[Box]) -> list[float]:
     high = np.minimum(mine[..., 2:], other.swapaxes(0, 1)[..., 2:])
     areas: list[float] = (high - low).clip(0).prod(axis=-1).sum(axis=-1).tolist()
     return areas
+
+
+def _crossed(box: Box, name: Name, taken: Sequence[Box], mark: float) -> int:
+    """How many points of a leader, beyond its own mark, are taken."""
+    steps = along(name.x, name.y, *_nearest(box, name))
+    away = [s for s in steps if abs(s.left - name.x) + abs(s.top - name.y) > 2 * mark]
+    return sum(any(step.shared(other) for other in taken) for step in away)
 
 
 def _nearest(box: Box, name: Name) -> tuple[float, float]:

@@ -75,14 +75,16 @@ def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance"
     methods = methods.assign(accuracy=accuracy.of(methods), label=labels(methods))
     replays_first = methods.sort_values("mode", key=lambda mode: mode != "replay", kind="stable")
     charts: list[Chart] = []
-    for _, figure in replays_first.groupby(FIGURE, sort=False, dropna=False):
+    stem = "speed-accuracy" if against == "distance" else f"speed-{against}"
+    figures = replays_first.groupby(FIGURE, sort=False, dropna=False)
+    for k, (_, figure) in enumerate(figures, start=1):
+        together = f"{stem}-{k}" if k > 1 else stem
         panels = _panels(figure, target, accuracy)
         tallest = max(panel.rail() for panel in panels)
         for panel in panels:
             number = f"-{len(charts) + 1}" if charts else ""
-            name = "speed-accuracy" if against == "distance" else f"speed-{against}"
             rail = tallest if target is Target.PAGE else panel.rail()
-            charts.append(panel.chart(name + number, rail))
+            charts.append(panel.chart(stem + number, together, rail))
     return charts
 
 
@@ -135,7 +137,7 @@ class Panel:
         """How high its rail is."""
         return rail_height(self.failures(), HEAD, self.target)
 
-    def chart(self, name: str, rail: float) -> Chart:
+    def chart(self, name: str, figure: str, rail: float) -> Chart:
         """All of it."""
         plane = Plane(self.target, self.title, self.x, self.y, rail=rail)
         if self.target.interactive:
@@ -144,7 +146,7 @@ class Panel:
         draw_rail(plane, self.failures(), HEAD)
         self._draw_points(plane, band)
         params = [{"name": QUESTION, "value": None}] if self.target.interactive else []
-        return Chart(name, self.title, self._caption(), plane.spec(params))
+        return Chart(name, self.title, self._caption(), plane.spec(params), figure)
 
     def _draw_points(self, plane: Plane, band: float) -> None:
         points = [_point(run, self.accuracy, self.y.low) for _, run in self.counted.iterrows()]

@@ -11,11 +11,16 @@ from pathlib import Path
 import pandas as pd
 
 from strainbench.progress import Track
-from strainbench.report.charts import Chart, Target, work_precision
-from strainbench.report.charts.convergence import convergence
-from strainbench.report.charts.energy import energy
-from strainbench.report.charts.growth import growth
-from strainbench.report.charts.profile import profiles
+from strainbench.report.charts import (
+    Chart,
+    Target,
+    convergence,
+    energy,
+    growth,
+    profiles,
+    sweep,
+    work_precision,
+)
 from strainbench.report.page.races import CASE
 
 ACCURACIES = ("distance", "gap", "violation")
@@ -97,6 +102,7 @@ def others(folder: Path, runs: pd.DataFrame, steps: pd.DataFrame) -> dict[str, l
     kept = _largest(runs, MOST)
     kinds: dict[str, list[Callable[[Target], Sequence[Chart]]]] = {
         "profile": [partial(profiles, runs, steps), partial(growth, kept)],
+        "failures": [lambda target: [c for own in sweep(kept, target).values() for c in own]],
         "convergence": [
             partial(_convergence, folder),
             lambda target: energy(folder, kept, target, LEAST),

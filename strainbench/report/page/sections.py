@@ -16,7 +16,7 @@ from strainbench.document import Items, Part, Picture, Prose, Table
 from strainbench.document.html import html
 from strainbench.progress import Track
 from strainbench.report import warm
-from strainbench.report.charts.profile import scores
+from strainbench.report.charts import scores
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.machine import machine_section
@@ -89,7 +89,9 @@ def sections(
         Section(
             "failures",
             "Where methods fail",
-            "A square says what was found, what an easier neighbour gave, and whose fault it is.",
+            "A square says what was found, what an easier neighbour gave, and whose fault it is. "
+            "A line of a sweep ends where its method fails.",
+            further["failures"],
             boxes=("matrix",) if len(failed) else (),
             body=Markup().join(
                 [

@@ -4,34 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from strainbench import escape
 from strainbench.bench.columns import WORDS
 from strainbench.bench.ending import Ending
 from strainbench.bench.records import RecordsError, read_machines, read_rows
 from strainbench.document import Column, Document, Items, Part, Prose, Table
 from strainbench.document.writers import markdown
-from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
+from strainbench.report.charts import Target, convergence, draw_sheet
 from strainbench.report.machine import machine_section
 from strainbench.report.numbers import power
 from strainbench.studies.convergence.measure import CANDIDATE, COLUMNS, CONVERGENCE
 
 LEVELS = (1e-2, 1e-4, 1e-6)
-PANELS = (
-    ("max_violation", "largest violation", 1e-10),
-    ("relative_gap", "relative gap", 1e-12),
-    ("distance_mm", "distance to optimum [mm]", FLOOR_MM),
-)
-"""Measure, its name on the axis, and the value at which anything smaller is drawn."""
-AXES = (("seconds", "seconds"), ("iterations", "iterations"))
-ABOVE = 10.0  # the axes end at this many times the candidate's own measure
 EXPLANATION = """\
 Each method's iterates or answers, measured by the referee: a value is reached at the first of them
 from which on all are at most that. Methods marked ° show no iterates: these are whole runs at ever
@@ -130,73 +116,9 @@ def _effort(rows: pd.DataFrame, measure: str, level: float) -> list[str]:
 
 
 def draw_convergence(table: pd.DataFrame, stem: Path) -> list[Path]:
-    """Rows violation, gap, distance; columns seconds, iterations."""
-    drawn = [(n, rows) for n, rows in methods(table) if rows["seconds"].notna().any()]
-    if not drawn:
-        return []
-    style = styles([name for name, _ in drawn])
-    figure = Figure(figsize=(11.5, 10.5), layout="constrained")
-    axes = figure.subplots(len(PANELS), len(AXES), sharex="col", sharey="row")
-    start = table[table["solver"] == CANDIDATE].iloc[0]
-    limits = {
-        "relative_gap": start["reference_gap"],
-        "distance_mm": 1000 * start["reference_error"],
-    }
-    for row, (measure, name, floor) in zip(axes, PANELS, strict=True):
-        for ax, (against, _) in zip(row, AXES, strict=True):
-            for label, rows in drawn:
-                _curve(ax, rows, against, measure, floor, style[label], label.endswith("°"))
-            _frame(ax, start[measure], limits.get(measure, 0.0))
-        lowest = np.fmax(table[measure].min(), floor)
-        row[0].set_ylim(lowest / 3, ABOVE * np.fmax(start[measure], lowest))
-        row[0].set_ylabel(name)
-    for ax, (_, name) in zip(axes[-1], AXES, strict=True):
-        ax.set_xlabel(name)
-    figure.suptitle(escape.chart(_title(start)), size=11)
-    handles = [
-        Line2D([], [], label=escape.chart(n), **_line(n.endswith("°")), **style[n])
-        for n, _ in drawn
-    ]
-    handles.append(Line2D([], [], label="the candidate itself", **ITSELF))
-    handles.append(Line2D([], [], label="reference certified to", **RESOLVED))
-    handles.append(Line2D([], [], linestyle="none", label="° answers at tolerances"))
-    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=9)
-    return save(figure, stem)
-
-
-ITSELF: dict[str, Any] = {"color": "#777777", "linestyle": ":", "linewidth": 1}
-
-
-def _line(by_answer: bool) -> dict[str, Any]:
-    """Full for iterates, dashed with hollow markers for answers at tolerances."""
-    return {
-        "linestyle": (0, (4, 2)) if by_answer else "-",
-        "fillstyle": "none" if by_answer else "full",
-        "linewidth": 1.3,
-        "markersize": 6,
-    }
-
-
-def _curve(
-    ax: Axes,
-    rows: pd.DataFrame,
-    against: str,
-    measure: str,
-    floor: float,
-    style: dict[str, Any],
-    by_answer: bool,
-) -> None:
-    """One method in one panel; values below the floor are drawn there."""
-    x = rows[against].clip(lower=1 if against == "iterations" else 1e-6)
-    every = None if by_answer else 0.08  # of the panel's diagonal between two markers
-    ax.plot(x, rows[measure].clip(lower=floor), markevery=every, **_line(by_answer), **style)
-
-
-def _frame(ax: Axes, start: float, resolved: float) -> None:
-    """Axes, and the lines that do not depend on a method."""
-    ax.set_xscale("log")
-    ax.set_yscale("log")
-    ax.grid(visible=True, which="major", color="#dddddd", linewidth=0.6)
-    ax.axhline(start, **ITSELF)
-    if 0 < resolved < float("inf"):
-        ax.axhline(resolved, **RESOLVED)
+    """Rows violation, gap, distance; columns seconds, iterations; a frame below the other."""
+    charts = convergence(table, Target.PAGE)
+    paths = [stem.with_suffix(ending) for ending in (".svg", ".png")] if charts else []
+    if charts:
+        draw_sheet(charts, paths, columns=2)
+    return paths
