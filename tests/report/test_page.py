@@ -267,7 +267,7 @@ def opened(browser, path):
 
 def test_one_single_row(browser, tmp_path):
     shown, text = opened(browser, report_of(tmp_path, row("newton-ipm")))
-    assert "newton-ipm reaches the optimum on every step: at 10×10." in text
+    assert "newton-ipm reaches the optimum on every step: 20 ms a projection at 10×10." in text
     shown.close()
 
 
