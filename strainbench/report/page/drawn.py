@@ -26,7 +26,7 @@ from strainbench.report.page.races import CASE
 ACCURACIES = ("distance", "gap", "violation")
 PANEL = ["scenario", "mode", "exact", "steps_asked", "threads", "mesh", "bound"]
 LEAST = 1.0  # seconds of play: less tells nothing of energies
-MOST, FEW = 40, 12  # panels, each twice 50 kB and twice a tenth of a second
+MOST, FEW = 20, 12  # panels, each twice 50 kB and twice a tenth of a second
 TARGETS = {"page": Target.PAGE, "phone": Target.PHONE}
 KEYS = {"scene": "scene", "mode": "mode", "bound": "limit", "aim": "aim", "mesh": "size"}
 """What the page calls the columns of a case."""
