@@ -33,6 +33,38 @@ over projections with active constraints, inside the solver, set-up apart, with 
 quartile; beside it, in the list of cells, the mean over all steps, those included in which nothing
 had to move. Distance, violation and gap: the worst step; `<` stands before the reference's own
 error where a distance is smaller."""
+HEADS = {
+    "speed": (
+        "Speed and accuracy",
+        "Lower left is better. The grey stair is the front that no method beats in both; the "
+        "yellow box is the question above. Hollow: within the limits, not the optimum.",
+    ),
+    "table": (
+        "Table 1",
+        "Bold is the fastest method that is optimal on every step. Grey numbers belong to runs "
+        "that do not count: they violate or did not finish. A row opens its record.",
+    ),
+    "profile": (
+        "Profile and growth",
+        "In how many cases a method is within a factor of the fastest; how its time grows with "
+        "the number of unknowns.",
+    ),
+    "failures": (
+        "Where methods fail",
+        "A square says what was found, what an easier neighbour gave, and whose fault it is. "
+        "A line of a sweep ends where its method fails.",
+    ),
+    "convergence": (
+        "Convergence and energy",
+        "How far an answer is from the optimum as time goes on; what happens to the energy.",
+    ),
+    "pictures": ("Pictures", "Of the scenes."),
+    "protocol": (
+        "Protocol and machine",
+        "What was measured, how, where, and what is older than what is installed.",
+    ),
+}
+"""The name of each section, its title, and how to read it."""
 Machines = Mapping[str, Mapping[str, object]]
 
 
@@ -57,63 +89,22 @@ def sections(
     track: Track,
 ) -> list[Section]:
     """Those that have something to show."""
-    first = runs.iloc[0]
-    signs = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
     charts, left_out = speed(runs, track)
-    further = others(folder, runs, steps)
+    drawings = {"speed": charts, **others(folder, runs, steps)}
+    boxes = {"table": ("table1", "cells"), "failures": ("matrix",) if len(failed) else ()}
+    swept = _folded("Sweeps in numbers", sweep_tables(runs), Prose(BEYOND))
+    bodies = {
+        "speed": html(left_out),
+        "table": _note(runs) + html(warm.table(runs), 3),
+        "profile": Markup().join(html(table, 3) for table in scores(runs, steps)),
+        "failures": _signs(failed, runs) + swept,
+        "convergence": _folded("Energies in numbers", [energy_table(folder, runs)]),
+        "pictures": _pictures(folder),
+        "protocol": _protocol(folder, runs, machines),
+    }
     every = [
-        Section(
-            "speed",
-            "Speed and accuracy",
-            "Lower left is better. The grey stair is the front that no method beats in both; the "
-            "yellow box is the question above. Hollow: within the limits, not the optimum.",
-            charts,
-            body=html(left_out),
-        ),
-        Section(
-            "table",
-            "Table 1",
-            "Bold is the fastest method that is optimal on every step. Grey numbers belong to runs "
-            "that do not count: they violate or did not finish. A row opens its record.",
-            boxes=("table1", "cells"),
-            body=_note(runs) + html(warm.table(runs), 3),
-        ),
-        Section(
-            "profile",
-            "Profile and growth",
-            "In how many cases a method is within a factor of the fastest; how its time grows "
-            "with the number of unknowns.",
-            further["profile"],
-            body=Markup().join(html(table, 3) for table in scores(runs, steps)),
-        ),
-        Section(
-            "failures",
-            "Where methods fail",
-            "A square says what was found, what an easier neighbour gave, and whose fault it is. "
-            "A line of a sweep ends where its method fails.",
-            further["failures"],
-            boxes=("matrix",) if len(failed) else (),
-            body=Markup().join(
-                [
-                    _signs(failed, signs),
-                    _folded("Sweeps in numbers", sweep_tables(runs), Prose(BEYOND)),
-                ]
-            ),
-        ),
-        Section(
-            "convergence",
-            "Convergence and energy",
-            "How far an answer is from the optimum as time goes on; what happens to the energy.",
-            further["convergence"],
-            body=_folded("Energies in numbers", [energy_table(folder, runs)]),
-        ),
-        Section("pictures", "Pictures", "Of the scenes.", body=_pictures(folder)),
-        Section(
-            "protocol",
-            "Protocol and machine",
-            "What was measured, how, where, and what is older than what is installed.",
-            body=_protocol(folder, runs, machines),
-        ),
+        Section(name, title, how, drawings.get(name, ()), boxes.get(name, ()), bodies[name])
+        for name, (title, how) in HEADS.items()
     ]
     return [part for part in every if part.charts or part.boxes or part.body]
 
@@ -126,8 +117,13 @@ def _note(runs: pd.DataFrame) -> Markup:
     return html(Prose(note + LOCAL * bool(local.any())))
 
 
-def _signs(failed: pd.DataFrame, signs: str) -> Markup:
-    return html(Prose(signs.replace("\n\n", " "))) if len(failed) else Markup()
+def _signs(failed: pd.DataFrame, runs: pd.DataFrame) -> Markup:
+    """What the signs of the matrix are; nothing without one."""
+    if failed.empty:
+        return Markup()
+    first = runs.iloc[0]
+    said = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
+    return html(Prose(said.replace("\n\n", " ")))
 
 
 def _folded(title: str, parts: Iterable[Part], *before: Part) -> Markup:
@@ -171,7 +167,7 @@ def _text(path: Path) -> Markup:
 
 def _pictures(folder: Path) -> Markup:
     """The folder's pictures that are not charts of ours, the small ones in the page."""
-    drawn = ("speed-accuracy", "energy", "sweep-")
+    drawn = ("speed-accuracy", "energy", "sweep-", "profile", "growth")
     paths = [
         path
         for path in sorted(folder.iterdir())
