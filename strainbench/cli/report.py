@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strainbench.cli.display import console, errors, say
+from strainbench.cli.display import console, errors, say, tracking
 from strainbench.cli.options import LOCAL, Columns, FailOn, Folder, Methods, Paper, TableFile
 from strainbench.options import WrongWordError, path
 
@@ -32,7 +32,8 @@ def report_results(
 
     if not paper and (methods or columns) is not None:
         raise WrongWordError("--methods and --columns choose what --paper writes: give it too")
-    with disk_errors(results.parent if results.suffix == BENCHMARKS else results):
+    place = results.parent if results.suffix == BENCHMARKS else results
+    with disk_errors(place), tracking() as track:
         if results.suffix == BENCHMARKS:
             paths = _perf(results)
         elif paper:
@@ -42,7 +43,7 @@ def report_results(
         else:
             from strainbench.report import write_report
 
-            paths = write_report(results)
+            paths = write_report(results, track)
     for written in paths:
         say(f"wrote {written}")
 

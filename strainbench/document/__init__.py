@@ -2,7 +2,7 @@
 
 Texts are given as they are, whatever they hold: the writers escape them, each in its own way.
 `strainbench.document.writers` has those of Markdown, LaTeX, CSV and terminal,
-`strainbench.document.page` that of a page.
+`strainbench.document.html` that of a page's parts.
 """
 
 from __future__ import annotations

@@ -49,11 +49,15 @@ class Case:
 
 
 def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
-    """A line for each method on each hard case of a results folder; see COLUMNS."""
-    says, cases = _statuses(folder, runs), _cases(runs)
+    """A line for each method on each hard case of a results folder, with the index of its run; see
+    COLUMNS."""
+    cases = _cases(runs)
+    if not cases:
+        return pd.DataFrame(columns=list(COLUMNS))
+    says = _statuses(folder, runs)
     keys = ["scenario_parameters", "solver", *RUN]
-    by_key = {tuple(row[keys]): row for _, row in runs.iterrows()}
-    lines = []
+    by_key = dict(zip(zip(*(runs[key] for key in keys), strict=True), runs.index, strict=True))
+    lines: dict[object, tuple[object, ...]] = {}
     for (parameters, *how), rows in runs.groupby(["scenario_parameters", *RUN], sort=False):
         case = cases.get(str(parameters))
         if case is None:
@@ -66,17 +70,17 @@ def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
             ]
         )
         infeasible = rows["reason"].str.contains("projections: infeasible:", regex=False).any()
-        for _, row in rows[rows["solver"] != UNCONSTRAINED].iterrows():
+        for index, row in rows[rows["solver"] != UNCONSTRAINED].iterrows():
             if Ending.of(row["reason"]) is Ending.UNAVAILABLE:
                 continue
             status = says.get((row["cell"], row["outcome"]), "")
             sign, found = _judge_infeasible(row, status) if infeasible else _judge(row, status)
-            easier = by_key.get((case.neighbour, *row[keys[1:]]))
+            place = by_key.get((case.neighbour, *row[keys[1:]]))
+            easier = None if place is None else runs.loc[place]
             verdict = "" if sign == PASSED else _verdict(row, easier, case.apart)
             there = "" if easier is None else easier["outcome"]
-            line = (title, row["solver"], sign, found, there, verdict, row["reason"])
-            lines.append(dict(zip(COLUMNS, line, strict=True)))
-    return pd.DataFrame(lines, columns=list(COLUMNS))
+            lines[index] = (title, row["solver"], sign, found, there, verdict, row["reason"])
+    return pd.DataFrame.from_dict(lines, orient="index", columns=list(COLUMNS))
 
 
 def _statuses(folder: Path, runs: pd.DataFrame) -> dict[tuple[str, str], str]:

@@ -6,29 +6,28 @@ from pathlib import Path
 
 from strainbench.bench.records import read_machines
 from strainbench.document import Document, Prose, Table
-from strainbench.document.page import page
 from strainbench.document.writers import csv, markdown
+from strainbench.progress import Track, untracked
 from strainbench.report.charts import draw_charts
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
+from strainbench.report.page import report_page
 from strainbench.report.paper import as_latex, chosen_methods
 from strainbench.report.runs import load_runs
 from strainbench.report.steps import newest_steps
 from strainbench.report.sweep import BEYOND, sweep_tables
-from strainbench.report.table import as_document, as_markdown, tidy
+from strainbench.report.table import as_markdown, tidy
 
 
-def write_report(folder: Path) -> list[Path]:
+def write_report(folder: Path, track: Track = untracked) -> list[Path]:
     """Write table1.csv, .md, .tex, what else there is to tell, the charts and index.html."""
     runs = load_runs(folder)
     machines = read_machines(folder)
     charts = draw_charts(folder, runs, newest_steps(folder, runs))
-    drawings = [path for path in charts if path.suffix == ".svg"]
     texts = {
         "table1.csv": csv(Table.of(tidy(runs))),
         "table1.md": as_markdown(runs, machines),
         "table1.tex": as_latex(chosen_methods(runs, None)),
-        "index.html": page(as_document(runs, machines, "strainbench results", drawings)),
     }
     if swept := sweep_tables(runs):
         texts["sweeps.md"] = markdown(Document("Sweeps", [Prose(BEYOND), *swept]))
@@ -38,6 +37,8 @@ def write_report(folder: Path) -> list[Path]:
         texts["failures.md"] = markdown(failures_document(failed, runs, machines))
     if (energy := energy_table(folder, runs)).lines:
         texts["energy.md"] = markdown(energy)
+    files = [*texts, *(path.name for path in charts)]
+    texts["index.html"] = report_page(folder, runs, failed, machines, files, track)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return [*(folder / name for name in texts), *charts]

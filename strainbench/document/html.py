@@ -1,0 +1,55 @@
+"""A part of a document as HTML, to stand in a page; pictures that are drawings are inlined."""
+
+from __future__ import annotations
+
+import base64
+from functools import cache
+from mimetypes import guess_type
+
+from jinja2 import Environment, PackageLoader, Template
+from markdown_it import MarkdownIt
+from markupsafe import Markup, escape
+
+from strainbench.document import Code, Part, Picture, Prose, Strong, blocks
+from strainbench.escape import plain
+
+
+def html(part: Part, level: int = 1) -> Markup:
+    """The part, its titles from this level on; nothing is fetched."""
+    return Markup(_template().render(blocks=list(blocks(part, level))))
+
+
+def inline(text: str) -> Markup:
+    """Text of whatever kind."""
+    if isinstance(text, Prose):
+        return Markup(MarkdownIt("commonmark", {"html": False}).renderInline(text))
+    words = escape(plain(text))
+    tags = {Code: "code", Strong: "strong", Faint: "small"}
+    tag = next((tag for kind, tag in tags.items() if isinstance(text, kind)), "")
+    return Markup(f"<{tag}>{words}</{tag}>") if tag else words
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=PackageLoader("strainbench.document", "."),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"inline": inline, "drawing": _drawing, "kind": _kind}
+    return environment.get_template("part.html")
+
+
+def _kind(block: object) -> str:
+    """Of what class a block is; a text is a text, however it is marked."""
+    return "str" if isinstance(block, str) else type(block).__name__
+
+
+def _drawing(picture: Picture) -> Markup:
+    """An SVG as it is, another picture as data."""
+    if picture.path.suffix == ".svg":
+        svg = picture.path.read_text(encoding="utf-8")
+        return Markup(svg[svg.index("<svg") :])
+    kind, data = guess_type(picture.path)[0], base64.b64encode(picture.path.read_bytes()).decode()
+    return Markup('<img src="data:{};base64,{}" alt="{}">').format(kind, data, plain(picture.about))

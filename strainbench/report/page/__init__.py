@@ -1,0 +1,165 @@
+"""The report as one page that needs no network: what was found, charts, tables, every record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader, Template
+from markupsafe import Markup
+
+from strainbench.document import Strong
+from strainbench.escape import plain
+from strainbench.progress import Track, untracked
+from strainbench.report.identity import look
+from strainbench.report.measures import OPTIMAL, measured, numbers
+from strainbench.report.names import percent
+from strainbench.report.page import data
+from strainbench.report.page.headline import headline
+from strainbench.report.page.races import CASE, with_cases
+from strainbench.report.page.sections import Section, sections
+from strainbench.report.page.tiles import tiles
+from strainbench.report.page.vega import vega_script
+from strainbench.report.steps import newest_steps
+from strainbench.report.table import UNCONSTRAINED
+
+HERE = Path(__file__).parent
+READ = (
+    *("cell", "step", "projection", "outcome", "status", "seconds", "active_constraints"),
+    *("max_violation", "relative_gap", "distance", "contact_energy"),
+    *("seconds_low", "seconds_high", "seconds_each"),
+)
+"""Columns of steps that the page is about; further ones would cost time."""
+BLOCK = list(CASE[:-1])
+SCRIPTS = ("parts.js", "drawer.js", "answer.js", "tables.js", "charts.js", "page.js")
+Machines = Mapping[str, Mapping[str, object]]
+
+
+def report_page(
+    folder: Path,
+    runs: pd.DataFrame,
+    failed: pd.DataFrame,
+    machines: Machines,
+    files: Sequence[str],
+    track: Track = untracked,
+) -> str:
+    """The page of a results folder.
+
+    Parameters
+    ----------
+    runs : as `strainbench.report.load_runs` has them
+    failed : as `strainbench.report.failures.failures` has it
+    files : names of what else was written, to be linked
+    """
+    steps = newest_steps(folder, runs)
+    steps = numbers(steps[[name for name in READ if name in steps]])
+    found = with_cases(measured(runs, steps))
+    parts = sections(folder, found, steps, failed, machines, track)
+    page: str = _template().render(
+        title=folder.resolve().name,
+        meta=_meta(found),
+        headline=headline(found),
+        tiles=[
+            tile for tile in tiles(found, steps, failed) if tile.section in {p.name for p in parts}
+        ],
+        several=len(found.drop_duplicates(BLOCK)) > 1,
+        sections=parts,
+        files=files,
+        style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
+        vega=Markup(vega_script()),
+        script=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)),
+        packed=data.packed(
+            {
+                "specs": {chart.name: chart.specs for part in parts for chart in part.charts},
+                "records": data.records(found),
+                "steps": data.step_lists(steps),
+            }
+        ),
+        records=Markup(data.as_json(_payload(folder, found, steps, failed, parts))),
+    )
+    return page
+
+
+def _payload(
+    folder: Path,
+    runs: pd.DataFrame,
+    steps: pd.DataFrame,
+    failed: pd.DataFrame,
+    parts: Iterable[Section],
+) -> dict[str, object]:
+    """What the script reads."""
+    ordered = runs.sort_values(["resolution", "mesh"], kind="stable")
+    limits = runs.sort_values(["limit", "bound"], kind="stable")
+    methods = list(runs["solver"].unique())
+    return {
+        "folder": plain(folder),
+        "alone": UNCONSTRAINED,
+        "cells": data.cells(runs, steps),
+        "failures": data.failed_lists(failed, runs),
+        "methods": {name: data.looks(name) for name in methods},
+        "families": data.families(methods),
+        "blocks": _blocks(runs),
+        "scenes": list(runs["scene"].unique()),
+        "modes": list(runs["mode"].unique()),
+        "limits": list(limits["bound"].unique()),
+        "aims": list(runs.sort_values("tolerance", ascending=False)["aim"].unique()),
+        "sizes": list(ordered["mesh"].unique()),
+        "grid": bool(runs["mesh"].str.contains("×").all()),
+        "charts": {chart.name: chart.about for part in parts for chart in part.charts},
+    }
+
+
+def _blocks(runs: pd.DataFrame) -> list[list[str]]:
+    """What a table is about, that with most cells and most optima first."""
+    optima = (runs["ending"] == OPTIMAL).groupby([runs[name] for name in BLOCK], sort=False)
+    order = optima.agg(["size", "sum"]).sort_values(["size", "sum"], ascending=False, kind="stable")
+    return [list(block) for block in order.index]
+
+
+def _meta(runs: pd.DataFrame) -> str:
+    """What all cells share, in a line."""
+    parts = [
+        *_few(runs["scene"], "{} scenes"),
+        *_few([_steps(row) for _, row in runs.iterrows()], ""),
+        *_few([f"limit {percent(v)}" if v == v else "" for v in runs["limit"]], "{} limits"),
+        *_few([f"directions {v}" if v else "" for v in runs["directions"].astype(str)], ""),
+        *_few(runs["aim"], "{} tolerances"),
+        *_few([f"{v:.0f} thread{'s' * (v > 1)}" for v in runs["threads"]], ""),
+        *_few(runs["machine"], "{} machines"),
+        str(max(runs["finished_at"].fillna("").astype(str)))[:10],
+    ]
+    return " · ".join(filter(None, parts))
+
+
+def _steps(row: pd.Series) -> str:
+    said = {"replay": "replayed frames 1 to", "simulate": "simulated steps 1 to"}
+    return f"{said.get(row['mode'], row['mode'])} {row['steps_asked']:.0f}"
+
+
+def _few(values: Iterable[str], form: str) -> list[str]:
+    """What all are, or how many there are."""
+    found = list(dict.fromkeys(values))
+    return found if len(found) == 1 else [form.format(len(found))]
+
+
+@cache
+def _template() -> Template:
+    environment = Environment(
+        loader=PackageLoader("strainbench.report.page", "."),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["plain"] = plain
+    environment.tests["strong"] = lambda piece: isinstance(piece, Strong)
+    environment.globals["mark"] = _mark
+    return environment.get_template("page.html")
+
+
+def _mark(method: str) -> Markup:
+    """A method's mark as an inline drawing."""
+    shown = look(plain(method))
+    drawing = '<svg class="mark" viewBox="-1.1 -1.1 2.2 2.2"><path d="{}" fill="{}"/></svg> '
+    return Markup(drawing).format(shown.shape, shown.colour)

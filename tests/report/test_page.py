@@ -1,0 +1,294 @@
+"""The page in a browser: it says what the records say, and everything on it can be read."""
+
+from __future__ import annotations
+
+import csv
+import json
+import random
+import re
+import shutil
+import statistics
+from math import floor, log10
+
+import pytest
+
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
+from strainbench.bench.records import RUNS, STEPS, append_rows
+from strainbench.report import write_report
+from tests.browser import Browser, chromium
+from tests.imports import HERE
+from tests.report.test_report import row
+
+LARGEST = 5_000_000  # bytes
+SMALLEST = 9.5  # pixels of text
+NASTY = 'a|b & 50% _c_ <b>x</b> </script><script>alert("x")</script>'
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    chromium()
+    started = Browser(tmp_path_factory.mktemp("profile"))
+    yield started
+    started.close()
+
+
+@pytest.fixture(scope="module")
+def field(tmp_path_factory):
+    """The report of committed results: two sizes, 18 methods."""
+    folder = tmp_path_factory.mktemp("field") / "field"
+    shutil.copytree(HERE / "results/field", folder)
+    write_report(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(browser, field):
+    shown = browser.open(field / "index.html")
+    shown.until(DRAWN)
+    return shown
+
+
+def report_of(folder, *rows, steps=()):
+    append_rows(folder / RUNS, RUN_COLUMNS, rows)
+    append_rows(folder / STEPS, STEP_COLUMNS, steps)
+    write_report(folder)
+    return folder / "index.html"
+
+
+def read(folder, name):
+    with (folder / name).open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+# --- what it says
+
+
+def shown_number(text):
+    """Two significant digits with a unit, as a number in SI units."""
+    number, unit = re.fullmatch(r"([\d.]+) (\S+)", text).groups()
+    return float(number) * {"s": 1, "ms": 1e-3, "µs": 1e-6}[unit]
+
+
+def two_digits(value):
+    return round(value, 1 - floor(log10(abs(value))))
+
+
+def test_the_headline_is_what_the_records_say(page, field):
+    """Worked out anew from the files alone."""
+    active = {}
+    for step in read(field, "steps.csv"):
+        if float(step["active_constraints"] or 0) > 0:
+            active.setdefault(step["cell"], []).append(float(step["seconds"]))
+    race = {}
+    for run in read(field, "runs.csv"):
+        if run["outcome"] == "optimal":
+            time = statistics.median(active[run["cell"]])
+            race.setdefault(int(run["resolution"]), []).append((time, run["solver"]))
+    ranked = [sorted(race[size]) for size in sorted(race)]
+    said = page.run("document.querySelector('h1').textContent.trim().replace(/\\s+/g, ' ')")
+    pattern = (
+        r"(\S+) reaches the optimum first: (.+) a projection at 20×20 and (.+) at 40×40, "
+        r"(\S+) and (\S+) times sooner than (\S+), the next\."
+    )
+    winner, *times, one, two, second = re.fullmatch(pattern, said).groups()
+    assert [(first[1], next_[1]) for first, next_, *_ in ranked] == [(winner, second)] * 2
+    for text, (first, *_) in zip(times, ranked, strict=True):
+        assert shown_number(text) == pytest.approx(two_digits(first[0]))
+    for text, (first, next_, *_) in zip((one, two), ranked, strict=True):
+        assert float(text) == pytest.approx(two_digits(next_[0] / first[0]))
+
+
+def each(page, selector, expression):
+    """What an expression in `e` comes to for each element."""
+    return page.run(
+        f"[...document.querySelectorAll({json.dumps(selector)})].map((e) => {expression})"
+    )
+
+
+def test_every_row_is_in_the_page(page, field):
+    cells = {run["cell"] for run in read(field, "runs.csv")}
+    assert set(page.run("data.cells.map((cell) => cell.id)")) == cells
+    assert set(each(page, "#cells tr[data-cell]", "e.dataset.cell")) == cells
+
+
+def test_every_entry_of_a_row_is_in_its_record(page, field):
+    for run in read(field, "runs.csv")[::7]:
+        found = page.run(f"record({json.dumps(run['cell'])})")
+        for name, value in run.items():
+            if name == "solver" and value != found[name]:
+                continue  # what tells it apart is added
+            same = found[name] in (value, None) or float(found[name]) == float(value)
+            assert same, (name, value, found[name])
+
+
+COLUMN = {
+    "time": lambda run, steps: 1000 * statistics.median(steps),
+    "distance": lambda run, steps: 1000 * float(run["distance_max"]),
+    "violation": lambda run, steps: float(run["max_violation"]),
+}
+
+
+def test_numbers_of_the_table_trace_to_rows(page, field):
+    """Fifty at random, or all."""
+    runs = {run["cell"]: run for run in read(field, "runs.csv")}
+    active = {}
+    for step in read(field, "steps.csv"):
+        if float(step["active_constraints"] or 0) > 0:
+            active.setdefault(step["cell"], []).append(float(step["seconds"]))
+    every = each(
+        page,
+        "#table1 td[data-column]",
+        "[e.dataset.cell, e.dataset.column, e.textContent.trim()]",
+    )
+    found = [entry for entry in every if entry[1] in COLUMN and entry[2][-1:].isdigit()]
+    assert len(found) > 50
+    for cell, column, text in random.Random(0).sample(found, 50):
+        expected = COLUMN[column](runs[cell], active[cell])
+        if text.startswith("<"):
+            error = 1000 * float(runs[cell]["reference_error_max"])
+            assert expected < error == pytest.approx(float(text[1:]), rel=0.06)
+        else:
+            assert float(text) == pytest.approx(
+                expected, rel=0.06 if column != "violation" else 0.5
+            )
+
+
+def ask(page, mm, ms, size):
+    page.run(
+        f"byId('asked-mm').value = '{mm}'; byId('asked-ms').value = '{ms}';"
+        f"byId('asked-size').value = '{size}';"
+        "byId('question').dispatchEvent(new Event('change'))"
+    )
+    return page.run("byId('answer').textContent")
+
+
+def test_the_question_is_answered_from_the_records(page):
+    said = ask(page, 0.1, 20, "20×20")
+    assert said.startswith("newton-ipm: 11 ms, 2.0 µm.")
+    assert "clarabel takes 3.5× the time" in said
+    assert ask(page, 0.1, 20, "40×40").startswith(
+        "None of those measured. Nearest misses: newton-ipm"
+    )
+    said = ask(page, 0.1, 20, "60×60")
+    assert said.startswith("Not measured at 60×60.")
+    assert "strainbench recommend swing --set resolution=60" in said
+    assert "--measure" in said
+
+
+# --- how it behaves
+
+
+def rows_of(page):
+    return each(page, "#cells tbody tr", "[...e.cells].map((c) => c.textContent.trim())")
+
+
+def test_filters_hold_together_and_stay_in_the_hash(page, browser, field):
+    page.run(
+        "for (const [name, value] of [['size', '20×20'], ['ending', 'feasible']]) {"
+        " const s = document.querySelector(`#filters select[name=${name}]`);"
+        " s.value = value; s.dispatchEvent(new Event('change')); }"
+    )
+    left = each(page, "#cells tbody tr", "cellOf.get(e.dataset.cell)")
+    assert {(cell["size"], cell["ending"]) for cell in left} == {("20×20", "feasible")}
+    hash_ = page.run("location.hash")
+    again = browser.open(field / "index.html", hash_=hash_)
+    again.until(DRAWN)
+    assert rows_of(again) == rows_of(page)
+    again.close()
+    page.run("document.querySelector('#filters button').click()")
+    assert len(rows_of(page)) == 36
+
+
+def test_a_chip_dims_all_others_and_again_undoes_it(page):
+    bright = ("#table1 tr[data-method]:not(.dim)", "e.dataset.method")
+    for expected in (["clarabel"], None):
+        page.run("document.querySelector('.chip[data-method=clarabel]').click()")
+        left = each(page, *bright)
+        assert left == expected if expected else len(left) == 17
+
+
+def test_heads_sort(page):
+    head = "document.querySelectorAll('#table1 thead tr:last-child th')[2]"
+    for direction, reverse in (("ascending", False), ("descending", True)):
+        page.run(f"{head}.querySelector('button').click()")
+        assert page.run(f"{head}.getAttribute('aria-sort')") == direction
+        keys = each(page, "#table1 tbody tr", "e.cells[2].dataset.sort")
+        times = [float(key) for key in keys if key]
+        assert times == sorted(times, reverse=reverse)
+        assert len(times) == 17
+
+
+def test_the_drawer_has_a_cells_record_and_steps(page):
+    page.run("document.querySelector('#table1 tr[data-method=dykstra]').click()")
+    said = page.run("byId('drawer').innerText")
+    for words in ("dykstra", "time limit", "strainbench run swing --mode replay --solver dykstra"):
+        assert words in said
+    assert page.run("document.querySelectorAll('#drawer tbody tr').length") == 8
+    assert "cell=" in page.run("location.hash")
+    page.run("document.dispatchEvent(new KeyboardEvent('keydown', {key: 'Escape'}))")
+    assert page.run("byId('drawer').hidden")
+
+
+def test_it_opens_without_a_network_or_a_fault_and_is_small(page, field):
+    assert page.faults() == []
+    assert page.requests() == []
+    assert (field / "index.html").stat().st_size < LARGEST
+
+
+SHOWN = "[...document.querySelectorAll('body *')].filter((e) => e.getClientRects().length)"
+WIDER = """.filter((e) => !e.closest('.scroll, #matrix, #chips')
+  && e.getBoundingClientRect().right > innerWidth + 1).map((e) => e.outerHTML.slice(0, 120))"""
+TINY = f""".filter((e) => [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())
+  && parseFloat(getComputedStyle(e).fontSize) < {SMALLEST}).map((e) => e.outerHTML.slice(0, 120))"""
+DRAWN = """document.body.dataset.drawn
+  === String(document.querySelectorAll('figure.chart:not([hidden])').length)"""
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_nothing_is_wider_than_the_window_and_no_text_too_small(browser, field, width):
+    shown = browser.open(field / "index.html", width)
+    shown.until(DRAWN)
+    assert shown.run("innerWidth") == width
+    assert shown.run("document.documentElement.scrollWidth") <= width
+    assert shown.run(SHOWN + WIDER) == []
+    assert shown.run(SHOWN + TINY) == []
+    shown.close()
+
+
+# --- folders that are hardly any
+
+
+def opened(browser, path):
+    shown = browser.open(path)
+    shown.until("document.body.dataset.drawn !== undefined")
+    assert shown.faults() == []
+    return shown, " ".join(shown.run("document.querySelector('main').innerText").split())
+
+
+def test_one_single_row(browser, tmp_path):
+    shown, text = opened(browser, report_of(tmp_path, row("newton-ipm")))
+    assert "newton-ipm reaches the optimum on every step: 20 ms a projection at 10×10." in text
+    shown.close()
+
+
+def test_failures_alone(browser, tmp_path):
+    failed = {"outcome": "no answer", "steps_done": 0, "distance_max": "", "max_violation": ""}
+    rows = [row(name, reason="crashed: of itself", **failed) for name in ("admm", "xpbd")]
+    shown, text = opened(browser, report_of(tmp_path, *rows))
+    assert "No method keeps the limits on every step." in text
+    assert "None of those measured." in text
+    shown.close()
+
+
+@pytest.mark.filterwarnings("ignore:constrained_layout")
+def test_names_are_text_and_nothing_else(browser, tmp_path):
+    rows = [row(NASTY, reason=NASTY), row("admm", scenario=NASTY)]
+    shown, text = opened(browser, report_of(tmp_path, *rows))
+    assert NASTY in text
+    shown.run("document.querySelector('#table1 tr[data-cell]').click()")
+    assert (
+        shown.run("document.querySelectorAll('main b b, main b script, #drawer script').length")
+        == 0
+    )
+    assert shown.run("document.querySelectorAll('script').length") == 4
+    shown.close()
