@@ -18,9 +18,9 @@ from strainbench.bench.ending import Ending
 from strainbench.document import Document, Items, Prose, Table
 from strainbench.referee.certificate import OUTCOMES
 from strainbench.report.machine import machine_section
-from strainbench.report.numbers import distance_text
+from strainbench.report.numbers import distance_text, power
 from strainbench.report.steps import newest_steps
-from strainbench.report.table import UNCONSTRAINED, power
+from strainbench.report.table import UNCONSTRAINED
 from strainbench.scenario.registry import find_scenario
 
 EXPLANATION = """\

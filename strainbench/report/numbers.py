@@ -16,3 +16,8 @@ def distance_text(row: pd.Series) -> str:
     if pd.isna(distance):
         return "-"
     return f"<{distance + error:.2g}" if distance < error else f"{distance:.2g}"
+
+
+def power(value: float) -> str:
+    """One digit and a power of ten, as in 3e-9; 0 is 0."""
+    return f"{value:.0e}".replace("e-0", "e-").replace("0e+00", "0").replace("e+00", "")

@@ -15,8 +15,8 @@ from strainbench.report.names import (
     mesh_name,
     settings,
 )
-from strainbench.report.numbers import seconds_text
-from strainbench.report.table import UNCONSTRAINED, power
+from strainbench.report.numbers import power, seconds_text
+from strainbench.report.table import UNCONSTRAINED
 
 SAME = (
     "scenario",

@@ -16,7 +16,7 @@ from strainbench.document.writers import latex, markdown
 from strainbench.report import warm
 from strainbench.report.machine import machine_section
 from strainbench.report.names import digits_of
-from strainbench.report.numbers import distance_text, seconds_text
+from strainbench.report.numbers import distance_text, power, seconds_text
 
 GROUP = ["scenario", "mode", "exact", "tolerance", "steps_asked", "threads"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
@@ -139,11 +139,6 @@ def accuracy_text(row: pd.Series | None) -> str:
             distance_text(row),
         )
     )
-
-
-def power(value: float) -> str:
-    """One digit and a power of ten, as in 3e-9; 0 is 0."""
-    return f"{value:.0e}".replace("e-0", "e-").replace("0e+00", "0").replace("e+00", "")
 
 
 def tidy(runs: pd.DataFrame) -> pd.DataFrame:

@@ -20,7 +20,7 @@ from strainbench.document import Column, Document, Items, Part, Prose, Table
 from strainbench.document.writers import markdown
 from strainbench.report.chart import FLOOR_MM, RESOLVED, save, styles
 from strainbench.report.machine import machine_section
-from strainbench.report.table import power
+from strainbench.report.numbers import power
 from strainbench.studies.convergence.measure import CANDIDATE, COLUMNS, CONVERGENCE
 
 LEVELS = (1e-2, 1e-4, 1e-6)

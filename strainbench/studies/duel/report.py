@@ -8,7 +8,7 @@ from math import isnan
 
 from strainbench.document import Column, Document, Prose, Table
 from strainbench.report.machine import machine_line
-from strainbench.report.table import power
+from strainbench.report.numbers import power
 from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER, Racer
 
 EXPLANATION = (

@@ -1,0 +1,179 @@
+"""What a cell's records come to: its time, how it ended, numbers as texts.
+
+Rows are those of `strainbench.report.load_runs` and `strainbench.report.steps.newest_steps`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import floor, isfinite, log10, nan
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from strainbench.bench.columns import STEP_COLUMNS, WORDS
+from strainbench.bench.ending import Ending
+from strainbench.report.numbers import power
+
+OPTIMAL, FEASIBLE, VIOLATED = "optimal", "feasible", "violated"
+OUT_OF_TIME, NO_ANSWER = "out of time", "no answer"
+ENDINGS = (OPTIMAL, FEASIBLE, VIOLATED, OUT_OF_TIME, NO_ANSWER)
+"""The better the earlier."""
+COUNT = (OPTIMAL, FEASIBLE)
+"""Those of which times and distances count."""
+SIGNS = {OPTIMAL: "✓", FEASIBLE: "○", VIOLATED: "✗", OUT_OF_TIME: "✗", NO_ANSWER: "✗"}
+CLOCK = ("time limit", "time_limit", "user_limit", "time out", "timeout", "max_time")
+"""What solvers say, in lower case, where the clock ended a projection."""
+NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
+"""Columns that `measured` adds."""
+
+
+class Quartiles(NamedTuple):
+    """Of `n` values; NaN without any."""
+
+    median: float
+    low: float
+    high: float
+    n: int
+
+    @classmethod
+    def of(cls, values: Iterable[float]) -> Quartiles:
+        """Of numbers, those that are none apart."""
+        known = np.asarray(list(values), float)
+        known = known[~np.isnan(known)]
+        if not len(known):
+            return cls(nan, nan, nan, 0)
+        low, median, high = np.quantile(known, [0.25, 0.5, 0.75])
+        return cls(float(median), float(low), float(high), len(known))
+
+
+@dataclass(frozen=True)
+class Finish:
+    """How a cell ended: one of ENDINGS, steps done of those planned, why in at most four words."""
+
+    ending: str
+    done: int
+    planned: int
+    why: str = ""
+
+    @property
+    def sign(self) -> str:
+        """✓, ○ or ✗."""
+        return SIGNS[self.ending]
+
+    @property
+    def counts(self) -> bool:
+        """Whether its time and its distance count."""
+        return self.ending in COUNT
+
+
+def numbers(steps: pd.DataFrame) -> pd.DataFrame:
+    """Rows of steps.csv with numbers as numbers."""
+    columns = [c for c in STEP_COLUMNS if c in steps and c not in WORDS]
+    parsed = {c: pd.to_numeric(steps[c].replace("", nan)) for c in columns}
+    return steps.assign(**parsed)
+
+
+def projections(steps: pd.DataFrame) -> pd.DataFrame:
+    """Those that had something to do: with active constraints at the optimum."""
+    return steps[steps["active_constraints"] > 0]
+
+
+def timing(steps: pd.DataFrame) -> Quartiles:
+    """Seconds a projection, over those that had something to do."""
+    return Quartiles.of(projections(steps)["seconds"])
+
+
+def by_clock(status: str) -> bool:
+    """Whether a solver says that its time was over."""
+    return any(words in status.lower() for words in CLOCK)
+
+
+def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
+    """How a cell ended; a projection that the clock cut off is no violation.
+
+    Parameters
+    ----------
+    steps : of this cell
+    """
+    asked, done = int(run["steps_asked"]), int(run["steps_done"])
+    if run["outcome"] == NO_ANSWER:
+        if Ending.of(run["reason"]) is Ending.TIME_LIMIT:
+            return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
+        return Finish(NO_ANSWER, done, asked, _cause(run["reason"]))
+    if run["outcome"] in COUNT:
+        return Finish(run["outcome"], done, asked)
+    failed = steps[~steps["outcome"].isin(COUNT)]
+    if len(failed) and failed["status"].map(by_clock).all():
+        done -= failed["step"].nunique()
+        return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
+    return Finish(VIOLATED, done, asked, f"violates by {power(run['max_violation'])}")
+
+
+def _cause(reason: str) -> str:
+    """Why there is no answer, in at most four words."""
+    known = {Ending.UNAVAILABLE: "not installed", Ending.UNSUPPORTED: "refuses the problem"}
+    ending = Ending.of(reason)
+    if ending is not None:
+        return known.get(ending, " ".join(ending.split()[:4]))
+    if "not finite" in reason:
+        return "not finite"
+    return " ".join(reason.partition(":")[0].partition(" (")[0].split()[:4]) or NO_ANSWER
+
+
+def measured(runs: pd.DataFrame, steps: pd.DataFrame) -> pd.DataFrame:
+    """Runs with the columns NEW; a cell without steps has its row's own median time.
+
+    Parameters
+    ----------
+    steps : of all cells, as `newest_steps` has them
+    """
+    parsed = numbers(steps)
+    own, none = dict(iter(parsed.groupby("cell"))), parsed.iloc[:0]
+    rows = [_measures(run, own.get(run["cell"], none)) for _, run in runs.iterrows()]
+    return runs.assign(**pd.DataFrame(rows, columns=list(NEW), index=runs.index))
+
+
+def _measures(run: pd.Series, steps: pd.DataFrame) -> tuple[object, ...]:
+    """The entries of NEW."""
+    end, time = finish(run, steps), timing(steps)
+    if steps.empty:
+        time = Quartiles.of([run["solve_seconds_median"]])._replace(n=0)
+    return (end.ending, end.done, end.why, *time)
+
+
+def digits(value: float, count: int = 2) -> str:
+    """A number to `count` significant digits, zeros at the end kept, no powers of ten."""
+    if value == 0 or not isfinite(value):
+        return f"{value:g}"
+    places = count - 1 - floor(log10(abs(float(f"{value:.{count - 1}e}"))))
+    return f"{round(value, places):.{max(places, 0)}f}"
+
+
+def with_unit(value: float, units: Sequence[tuple[float, str]], count: int = 2) -> str:
+    """A number in the largest unit of which there is at least one; units from large to small."""
+    size, name = next((u for u in units if float(f"{abs(value):.1e}") >= u[0]), units[-1])
+    return f"{digits(value / size, count)} {name}"
+
+
+TIME = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"))
+LENGTH = ((1000.0, "m"), (10.0, "cm"), (1.0, "mm"), (1e-3, "µm"), (1e-6, "nm"))
+
+
+def duration(seconds: float) -> str:
+    """Two significant digits, in s, ms or µs."""
+    return with_unit(seconds, TIME)
+
+
+def length(mm: float) -> str:
+    """Two significant digits, in m, cm, mm, µm or nm."""
+    return with_unit(mm, LENGTH)
+
+
+def distance_text(mm: float, error_mm: float) -> str:
+    """Two significant digits in mm; below the error of the reference, that it is below it."""
+    if mm != mm:
+        return ""
+    return f"<{digits(error_mm)}" if mm < error_mm else digits(mm)

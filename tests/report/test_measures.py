@@ -1,0 +1,106 @@
+"""What a cell's records come to: time over projections that had something to do, how it ended."""
+
+from __future__ import annotations
+
+from math import isnan, nan
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from strainbench.report import load_runs
+from strainbench.report.measures import (
+    Finish,
+    digits,
+    distance_text,
+    duration,
+    finish,
+    length,
+    measured,
+    timing,
+)
+from strainbench.report.steps import newest_steps
+
+FIELD = Path(__file__).parents[2] / "results/field"
+
+
+def steps(*rows):
+    columns = ["step", "outcome", "status", "seconds", "active_constraints"]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def run(outcome, reason="", done=3, violation=0.031):
+    row = {"outcome": outcome, "reason": reason, "steps_done": done, "steps_asked": 3}
+    return pd.Series(row | {"max_violation": violation})
+
+
+FREE = (1, "optimal", "solved", 0.001, 0)
+FIRST, SECOND = (2, "optimal", "solved", 0.1, 5), (3, "optimal", "solved", 0.2, 9)
+CUT, OWN = (3, "violated", "user_limit", 2.0, 9), (2, "violated", "solved", 0.1, 9)
+
+
+def test_a_free_frame_does_not_make_a_method_fast():
+    assert timing(steps(FREE, FIRST, SECOND)) == pytest.approx((0.15, 0.125, 0.175, 2))
+
+
+def test_without_anything_to_project_there_is_no_time():
+    nothing = timing(steps(FREE))
+    assert isnan(nothing.median)
+    assert nothing.n == 0
+
+
+@pytest.mark.parametrize(
+    ("row", "rows", "expected"),
+    [
+        (run("optimal"), (FREE, FIRST, SECOND), Finish("optimal", 3, 3)),
+        (run("violated"), (FREE, FIRST, CUT), Finish("out of time", 2, 3, "2 of 3")),
+        (run("violated"), (FREE, OWN, CUT), Finish("violated", 3, 3, "violates by 3e-2")),
+        (
+            run("no answer", "time limit of 9 s (1 of 3 steps)", 1),
+            (FREE,),
+            Finish("out of time", 1, 3, "1 of 3"),
+        ),
+        (run("no answer", "unavailable: x", 0), (), Finish("no answer", 0, 3, "not installed")),
+        (
+            run("no answer", "positions that are not finite; it says 'a' (1 of 3 steps)", 1),
+            (FREE,),
+            Finish("no answer", 1, 3, "not finite"),
+        ),
+    ],
+)
+def test_what_the_clock_cut_off_is_out_of_time_and_no_violation(row, rows, expected):
+    assert finish(row, steps(*rows)) == expected
+
+
+def test_the_committed_field_says_who_ran_out_of_time():
+    runs = load_runs(FIELD)
+    runs = measured(runs, newest_steps(FIELD, runs))
+    fine = runs[runs["resolution"] == 40].set_index("solver")
+    for name in ("cvxpy", "dykstra", "linearized-qp"):
+        assert (fine.loc[name, "ending"], fine.loc[name, "why"]) == ("out of time", "7 of 8")
+    assert fine.loc["ipopt-edges", "ending"] == "violated"
+    coarse = runs[runs["resolution"] == 20].set_index("solver")
+    assert digits(1000 * coarse.loc["newton-ipm", "time"]) == "11"
+    assert coarse.loc["newton-ipm", "time_count"] == 7
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (digits(0.002006), "0.0020"),
+        (digits(0.0996), "0.10"),
+        (digits(1312.0), "1300"),
+        (digits(99.7), "100"),
+        (duration(0.011), "11 ms"),
+        (duration(0.9996), "1.0 s"),
+        (duration(8.4e-4), "840 µs"),
+        (length(13.2), "1.3 cm"),
+        (length(2.0e-3), "2.0 µm"),
+        (length(3e-9), "0.0030 nm"),
+        (distance_text(0.001, 0.0027), "<0.0027"),
+        (distance_text(0.0048, 0.0027), "0.0048"),
+        (distance_text(nan, 0.0027), ""),
+    ],
+)
+def test_numbers_have_two_significant_digits(text, expected):
+    assert text == expected
