@@ -16,8 +16,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solvers.newton_ipm.mesh import ROUNDING, Change, Slots, Sums, add_sums, spread_blocks
+from solvers.newton_ipm.matrix import Slots, spread_blocks
+from solvers.newton_ipm.mesh import ROUNDING, Change, Sums, add_sums
 from solvers.newton_ipm.symmetric import (
+    after,
     congruent,
     dot,
     eigenvalues,
@@ -33,7 +35,6 @@ from solvers.newton_ipm.symmetric import (
 from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.physics.pattern import Pattern
 from strainbench.problem.rows import Rows, gather, spread
 
 ROOT_HALF = 0.5**0.5
@@ -60,10 +61,9 @@ class ExactCones:
     degree : 2e, the number of products
     """
 
-    def __init__(self, problem: Problem, pattern: Pattern) -> None:
+    def __init__(self, problem: Problem, slots: Slots) -> None:
         e = len(problem.elements)
-        self._G, self.degree = Rows.of_axes(problem), problem.rows
-        self._slots = Slots(pattern.slots[0], pattern.stride)
+        self._G, self._slots, self.degree = Rows.of_axes(problem), slots, problem.rows
         scaling = (*np.empty((2, e, 2, 2)), np.empty((e, 2)))
         self.b, self.at = problem.bounds, Point(np.empty((e, 2, 3)), *np.empty((3, e, 3)), *scaling)
         self._c, self._h = np.empty((2, e, 3))
@@ -95,13 +95,11 @@ class ExactCones:
 
     def measure(self, y_target: FloatArray, Y: FloatArray, pull: FloatArray) -> Sums:
         """L Y (2e, 3) is filled, and G^T L Y added to `pull` (n, 3)."""
-        shape = self.at.y.shape
-        sums = (self.b, y_target.reshape(shape), Y.reshape(shape), pull)
-        return measure(self._G, self.at, *sums)
+        return measure(self._G, self.at, self.b, y_target, Y.reshape(self.at.y.shape), pull)
 
-    def assemble(self, data: FloatArray) -> float:
+    def assemble(self, values: FloatArray) -> float:
         """Add the constraints' part of K to the matrix's values; <S, L>."""
-        return assemble(self._G, self._slots, self.at, self.b, data)
+        return assemble(self._G, self._slots, self.at, self.b, values)
 
     def aim(self, mu: float, affine: Change | None = None) -> None:
         """To take all products to mu, the second-order error of a predictor included."""
@@ -185,7 +183,7 @@ def measure(
 
 
 @compiled(error_model="numpy")
-def assemble(G: Rows, slots: Slots, at: Point, b: FloatArray, data: FloatArray) -> float:
+def assemble(G: Rows, slots: Slots, at: Point, b: FloatArray, values: FloatArray) -> float:
     """Scale each element and add its blocks; residuals are filled in, and <S, L> is returned."""
     H, A, total = np.empty((2, 2, 3, 3)), np.empty((2, 3, 3)), 0.0
     for e in range(len(b)):
@@ -211,7 +209,7 @@ def assemble(G: Rows, slots: Slots, at: Point, b: FloatArray, data: FloatArray) 
                         H[c, f, i, j] = h + A[c, i, 2] * A[f, j, 2]
                     H[c, f, i, i] += l[c] if c == f else l[2]
         H[0, 1] = H[1, 0].T
-        spread_blocks(G, slots, e, H, data)
+        spread_blocks(G, slots, e, H, values)
     return total
 
 
@@ -233,12 +231,6 @@ def aim_again(
         for i in range(3):
             c[e, i] -= error[i]
             at.r[e, i] -= square[e, i]
-
-
-@compiled
-def after(d: FloatArray, A: FloatArray, a: float, e: int) -> tuple[float, float, float]:
-    """diag(d) + a A of element e."""
-    return d[e, 0] + a * A[e, 0], d[e, 1] + a * A[e, 1], a * A[e, 2]
 
 
 @compiled

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from solvers.newton_ipm.exact import ExactCones
-from solvers.newton_ipm.mesh import Change
+from solvers.newton_ipm.matrix import Matrix
+from solvers.newton_ipm.mesh import Change, put, residual, take
 from solvers.newton_ipm.sampled import SampledCones
 from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import best_linear_solver
-from strainbench.physics.pattern import Pattern
 from strainbench.problem.kinds import Exact, Kind, Sampled
 
 FLOOR = 3e-3  # least first slack, in b^2
@@ -36,9 +36,9 @@ class State:
     """What a mesh needs once, and the last frame's centred iterate."""
 
     def __init__(self, problem: Problem) -> None:
-        self.pattern = Pattern.of([problem.elements], problem.vertices, problem.held)
-        self.linear = best_linear_solver(self.pattern.matrix())
-        self.cones = CONES[type(problem.kind)](problem, self.pattern)
+        self.matrix = Matrix(problem)
+        self.linear = best_linear_solver(self.matrix.lower)
+        self.cones = CONES[type(problem.kind)](problem, self.matrix.slots)
         self.snapshot: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
         self.cold_iterations = 0
         _ = problem.largest_objective  # its shortest paths are kept with the problem
@@ -65,7 +65,7 @@ class Iterate:
         self.tolerance = tolerance
         self.problem, self.state, self.cones = problem, state, state.cones
         self.keep = keep
-        self.target, self.weights = problem.target, problem.weights[:, None]
+        self.target = problem.target
         self.free, self.floor = problem.free, problem.objective_floor
         self.infeasible = False
         self.x = problem.target
@@ -74,6 +74,15 @@ class Iterate:
             self.cones.at.y.copy(),
             np.maximum(self.cones.excess(), 0.0),
         )
+
+    def begin(self) -> bool:
+        """Resume where a snapshot is kept and there is one, else start; which of them it was."""
+        resumed = self.keep and self.state.snapshot is not None
+        if resumed:
+            self.resume()
+        else:
+            self.start()
+        return resumed
 
     def start(self) -> None:
         """From the target, with products of a guess: the violation over the size of the mesh."""
@@ -96,12 +105,12 @@ class Iterate:
 
     def measure(self) -> float:
         """The larger of relative gap at x, the violations priced in, and STRICTER violations."""
-        self.Y, pull = np.empty((self.problem.rows, 3)), np.zeros_like(self.x)
+        self.Y, pull, self.r_d = np.empty((self.problem.rows, 3)), *np.zeros((2, *self.x.shape))
         most, linear, price, beyond, worst = self.cones.measure(self.y_target, self.Y, pull)
-        self.r_d = self.weights * (self.x - self.target) + pull
-        self.objective = objective = self.problem.objective(self.x)
+        pull[self.problem.held] = 0.0
+        objective, square = residual(self.problem.weights, self.x, self.target, pull, self.r_d)
+        self.objective = objective
         linear -= most * (1 + ROUNDING)
-        square = float(np.sum(pull[self.free] ** 2 / self.weights[self.free]))
         bound = 0.5 * linear**2 / square if linear > 0 < square else 0.0
         self.infeasible = bound > objective and bound > self.problem.largest_objective
         scale = max(bound, self.floor)
@@ -112,11 +121,9 @@ class Iterate:
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
-        cones, pattern = self.cones, self.state.pattern
-        data = np.zeros(len(pattern.indices))
-        pattern.add_diagonal(data, self.problem.weights)
-        total = cones.assemble(data)
-        self.state.linear.factorise(data)  # 3
+        cones, values = self.cones, self.state.matrix.mass()
+        total = cones.assemble(values)
+        self.state.linear.factorise(values)  # 3
         mean = total / cones.degree
         if self.keep and self.gap < SNAPSHOT and self.violation < SNAPSHOT:
             cones.aim(mean)
@@ -148,9 +155,10 @@ class Iterate:
 
     def _direction(self) -> tuple[FloatArray, Change]:
         """One solve with the factor at hand: dx (n, 3), ds and dl."""
-        force, dx = self.r_d.copy(), np.zeros_like(self.r_d)
+        force, dx, b = self.r_d.copy(), np.zeros_like(self.r_d), np.empty(3 * len(self.free))
         self.cones.push(force)
-        dx[self.free] = self.state.linear.solve(-force[self.free].ravel()).reshape(-1, 3)
+        take(force, self.free, b)
+        put(self.state.linear.solve(b), self.free, dx)
         return dx, self.cones.change(dx)
 
     def _snapshot(self, dx: FloatArray, change: Change) -> None:

@@ -1,4 +1,4 @@
-"""What both kinds of limits share: a step, and what an element adds to the matrix.
+"""What both kinds of limits share: a step, sums over constraints, and vectors over vertices.
 
 The functions are compiled into the loops that call them.
 """
@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
-from strainbench.problem.rows import Rows
 
 ROUNDING = 1e-14
 """Residuals below it count as 0: divided by small slacks, rounding would floor the gap."""
@@ -49,13 +48,6 @@ class Sums(NamedTuple):
     worst: float
 
 
-class Slots(NamedTuple):
-    """Where blocks go: (e, k, k) and (n,) of `strainbench.physics.pattern.Pattern`."""
-
-    slots: IntArray
-    stride: IntArray
-
-
 @compiled
 def add_sums(sums: Sums, b: float, norm: float, excess: float, linear: float) -> Sums:
     """The sums with one constraint more."""
@@ -72,58 +64,31 @@ def add_sums(sums: Sums, b: float, norm: float, excess: float, linear: float) ->
 
 
 @compiled
-def spread_blocks(G: Rows, at: Slots, e: int, H: FloatArray, data: FloatArray) -> None:
-    """Add sum_cf B_ca B_fb H_cf, of H (dim, dim, 3, 3), to the block of each vertex pair a, b."""
-    for b in range(len(G.corners)):
-        width = at.stride[G.vertices[e, b]]
-        for a in range(len(G.corners)):
-            first = at.slots[e, a, b]
-            if first < 0:
-                continue
-            for j in range(3):
-                k0 = k1 = k2 = 0.0
-                for c in range(len(G.axes)):
-                    for f in range(len(G.axes)):
-                        weight = G.coefficients[e, c, a] * G.coefficients[e, f, b]
-                        k0 += weight * H[c, f, 0, j]
-                        k1 += weight * H[c, f, 1, j]
-                        k2 += weight * H[c, f, 2, j]
-                column = first + j * width
-                data[column] += k0
-                data[column + 1] += k1
-                data[column + 2] += k2
+def residual(
+    weights: FloatArray, x: FloatArray, t: FloatArray, pull: FloatArray, r_d: FloatArray
+) -> tuple[float, float]:
+    """r_d = M (x - t) + pull; 1/2 ||x - t||_M^2, and ||pull||^2_{M^-1}."""
+    objective = square = 0.0
+    for v in range(len(x)):
+        for i in range(3):
+            d = x[v, i] - t[v, i]
+            r_d[v, i] = weights[v] * d + pull[v, i]
+            objective += 0.5 * weights[v] * d * d
+            square += pull[v, i] * pull[v, i] / weights[v]
+    return objective, square
 
 
 @compiled
-def spread_symmetric(G: Rows, at: Slots, e: int, H: FloatArray, data: FloatArray) -> None:
-    """The same for H_cf = H_fc = H_cf^T, whose entries 00, 01, 02, 11, 12, 22 are H (dim, dim, 6).
+def take(force: FloatArray, free: IntArray, b: FloatArray) -> None:
+    """The right-hand side b (3 free,) = -force at the free vertices."""
+    for k in range(len(free)):
+        for i in range(3):
+            b[3 * k + i] = -force[free[k], i]
 
-    Those with f <= c are read.
-    """
-    for b in range(len(G.corners)):
-        width = at.stride[G.vertices[e, b]]
-        for a in range(len(G.corners)):
-            first = at.slots[e, a, b]
-            if first < 0:
-                continue
-            k0 = k1 = k2 = k3 = k4 = k5 = 0.0
-            for c in range(len(G.axes)):
-                for f in range(c + 1):
-                    weight = G.coefficients[e, c, a] * G.coefficients[e, f, b]
-                    if f < c:
-                        weight += G.coefficients[e, f, a] * G.coefficients[e, c, b]
-                    k0 += weight * H[c, f, 0]
-                    k1 += weight * H[c, f, 1]
-                    k2 += weight * H[c, f, 2]
-                    k3 += weight * H[c, f, 3]
-                    k4 += weight * H[c, f, 4]
-                    k5 += weight * H[c, f, 5]
-            data[first] += k0
-            data[first + 1] += k1
-            data[first + 2] += k2
-            data[first + width] += k1
-            data[first + width + 1] += k3
-            data[first + width + 2] += k4
-            data[first + 2 * width] += k2
-            data[first + 2 * width + 1] += k4
-            data[first + 2 * width + 2] += k5
+
+@compiled
+def put(solution: FloatArray, free: IntArray, dx: FloatArray) -> None:
+    """The (3 free,) entries of a solution in dx (n, 3)."""
+    for k in range(len(free)):
+        for i in range(3):
+            dx[free[k], i] = solution[3 * k + i]

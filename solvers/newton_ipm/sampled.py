@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solvers.newton_ipm.mesh import ROUNDING, Change, Slots, Sums, add_sums, spread_symmetric
+from solvers.newton_ipm.matrix import Slots, spread_symmetric
+from solvers.newton_ipm.mesh import ROUNDING, Change, Sums, add_sums
 from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
-from strainbench.physics.pattern import Pattern
 from strainbench.problem.rows import Rows, gather, spread
 
 
@@ -42,11 +42,10 @@ class SampledCones:
     degree : number of products s l
     """
 
-    def __init__(self, problem: Problem, pattern: Pattern) -> None:
+    def __init__(self, problem: Problem, slots: Slots) -> None:
         rows = self.degree = problem.rows
         directions = np.ascontiguousarray(problem.limits.directions)
-        self._mesh = Mesh(Rows.of_axes(problem), directions)
-        self._slots = Slots(pattern.slots[0], pattern.stride)
+        self._mesh, self._slots = Mesh(Rows.of_axes(problem), directions), slots
         self.b, self.at = problem.bounds, Point(np.empty((rows, 3)), *np.empty((3, rows)))
         self._c, self._h = np.empty((2, rows))
 
@@ -81,9 +80,9 @@ class SampledCones:
         """Y = l y (rows, 3) is filled, and G^T Y added to `pull` (n, 3)."""
         return measure(self._mesh, self.at, self.b, y_target, Y, pull)
 
-    def assemble(self, data: FloatArray) -> float:
+    def assemble(self, values: FloatArray) -> float:
         """Add sum l g g^T (x) I + (l/s) (g (x) y)(g (x) y)^T to the matrix's values; <s, l>."""
-        return assemble(self._mesh, self._slots, self.at, self.b, data)
+        return assemble(self._mesh, self._slots, self.at, self.b, values)
 
     def aim(self, mu: float, affine: Change | None = None) -> None:
         """To take all products to mu, the second-order error of a predictor included."""
@@ -153,7 +152,7 @@ def measure(
 
 
 @compiled(error_model="numpy")
-def assemble(mesh: Mesh, slots: Slots, at: Point, b: FloatArray, data: FloatArray) -> float:
+def assemble(mesh: Mesh, slots: Slots, at: Point, b: FloatArray, values: FloatArray) -> float:
     """Add sum_i l g g^T (x) I + (l/s) (g (x) y)(g (x) y)^T, by element and material axes.
 
     The residuals are filled in on the way, and <s, l> is returned.
@@ -184,7 +183,7 @@ def assemble(mesh: Mesh, slots: Slots, at: Point, b: FloatArray, data: FloatArra
                     H[c, f, 3] += weight * h3
                     H[c, f, 4] += weight * h4
                     H[c, f, 5] += weight * h5
-        spread_symmetric(G, slots, e, H, data)
+        spread_symmetric(G, slots, e, H, values)
     return total
 
 

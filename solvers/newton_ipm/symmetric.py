@@ -17,6 +17,12 @@ def entries(A: FloatArray, e: int) -> Symmetric:
 
 
 @compiled
+def after(d: FloatArray, A: FloatArray, a: float, e: int) -> Symmetric:
+    """diag(d) + a A of element e."""
+    return d[e, 0] + a * A[e, 0], d[e, 1] + a * A[e, 1], a * A[e, 2]
+
+
+@compiled
 def dot(A: Symmetric, B: Symmetric) -> float:
     """<A, B>: an off-diagonal entry counts twice."""
     return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2]

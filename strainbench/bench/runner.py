@@ -22,12 +22,13 @@ from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running
 from strainbench.bench.journal import keep_targets
 from strainbench.bench.machine import describe_machine, fixed_threads
-from strainbench.bench.preload import Nurseries
+from strainbench.bench.preload import STARTS, Nurseries
 from strainbench.bench.process import Family, family
 from strainbench.bench.recording import recorder
 from strainbench.bench.records import latest_runs, mend, open_folder, remember_machine, write_cell
 from strainbench.bench.rows import identity
 from strainbench.files import locked
+from strainbench.options import shown
 from strainbench.progress import Observer as Observer
 from strainbench.referee.reference import REFERENCE_SOLVER
 
@@ -51,6 +52,10 @@ class Settings:
     memory_limit_mb: float = 8192.0
     rerun: bool = False
     processes: str = "fork"
+
+    def __post_init__(self) -> None:
+        if self.processes not in STARTS:
+            raise ValueError(f"--processes {shown(self.processes)}: valid are {', '.join(STARTS)}")
 
 
 @dataclass

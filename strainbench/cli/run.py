@@ -57,11 +57,8 @@ def run_cells(
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
     from strainbench.bench.machine import memory_share
     from strainbench.bench.plan import never_warm, plan
-    from strainbench.bench.preload import STARTS
     from strainbench.bench.runner import Settings
 
-    if processes not in STARTS:
-        raise ValueError(f"--processes {shown(processes)}: valid are {', '.join(STARTS)}")
     if scheduler is not None and not scheduler.strip():
         raise ValueError("--scheduler '': an address such as tcp://host:8786 is valid")
     if steps is not None and duration is not None:

@@ -6,6 +6,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -142,23 +143,14 @@ def let_duel(
     machine, about = describe_machine(threads=1)
     recording = _recorded(cells[0], max(map(max, sequences)), None if units else results)
     with progress() as bar:
-        task = bar.add_task("projections", total=repeats * sum(map(len, sequences)) * len(cells))
-        entries = duel(
-            solvers,
-            recording,
-            sequences,
-            repeats,
-            tolerance,
-            time_limit,
-            units,
-            lambda: bar.advance(task),
-        )
+        turns = repeats * sum(map(len, sequences)) * len(cells)
+        turn = partial(bar.advance, bar.add_task("projections", total=turns))
+        entries = duel(solvers, recording, sequences, repeats, tolerance, time_limit, units, turn)
     for entry, cell in zip(entries, cells, strict=False):  # units of time may follow
         entry.label = cell.solver.label
     title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
     outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
-    wide = Console(width=max(console.width, 200))  # its columns are many
-    wide.print(terminal(outcome.table()))
+    Console(width=max(console.width, 200)).print(terminal(outcome.table()))  # many columns
     if output is not None:
         write_output(output, outcome.document(), outcome.cells())
         say(f"wrote {output}")

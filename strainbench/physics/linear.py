@@ -167,18 +167,20 @@ class Pardiso(LinearSolver):
         # columns of the lower triangle are the rows of the upper one, which MKL takes
         self._starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         self._indices = pattern.indices[self._below].astype(np.int32)
-        self._values = np.ones(len(self._indices))
+        self._lower = np.ones(len(self._indices))
         self._memory = np.zeros(64, dtype=np.int64)
         self._parameters = np.zeros(64, dtype=np.int32)
         self._parameters[0] = 1  # these, not the defaults: minimum degree, no refinement
         self._parameters[34] = 1  # indices from 0
+        self._bind(self._lower)
         self._call(self._ANALYSE)
         weakref.finalize(self, _pardiso, self._matrix, self._RELEASE).atexit = False
 
-    @property
-    def _matrix(self) -> tuple[Any, ...]:
-        arrays = (self._values, self._starts, self._indices)
-        return self._function, self._memory, self._parameters, *arrays
+    def _bind(self, values: FloatArray) -> None:
+        """Set the arguments that stay the same while these are the values."""
+        self._values = values
+        arrays = (self._memory, self._parameters, values, self._starts, self._indices)
+        self._matrix = (self._function, len(self._starts) - 1, *map(_array, arrays))
 
     def _call(self, phase: int, b: FloatArray | None = None) -> FloatArray:
         x, error = _pardiso(self._matrix, phase, b)
@@ -190,7 +192,10 @@ class Pardiso(LinearSolver):
 
     def factorise(self, data: FloatArray) -> None:
         """See the base class."""
-        np.take(data, self._below, out=self._values)
+        if len(data) > len(self._below):
+            data = np.take(data, self._below, out=self._lower)
+        if data is not self._values:
+            self._bind(data)
         if not np.all(np.isfinite(self._values)):
             raise NotPositiveDefiniteError("a value is not finite")
         self._call(self._FACTORISE)
@@ -217,24 +222,27 @@ def _pardiso(
     matrix: tuple[Any, ...], phase: int, b: FloatArray | None = None
 ) -> tuple[FloatArray, int]:
     """x and the error code of MKL's function: one matrix, any right-hand sides, no output."""
-    function, memory, parameters, values, starts, indices = matrix
-    n = len(starts) - 1
+    function, n, memory, parameters, values, starts, indices = matrix
     b = np.zeros(n) if b is None else np.asfortranarray(b, dtype=np.float64)
-    x, permutation, error = np.empty_like(b), np.zeros(1, dtype=np.int32), ctypes.c_int32(0)
-
-    def number(value: int) -> Any:
-        return ctypes.byref(ctypes.c_int32(value))
-
-    def array(entries: NDArray[Any]) -> Any:
-        return entries.ctypes.data_as(ctypes.c_void_p)
-
-    kind = 2  # real, symmetric positive definite
+    x, error = np.empty_like(b), ctypes.c_int32(0)
     function(
-        *(array(memory), number(1), number(1), number(kind), number(phase), number(n)),
-        *(array(values), array(starts), array(indices), array(permutation), number(b.size // n)),
-        *(array(parameters), number(0), array(b), array(x), ctypes.byref(error)),
+        *(memory, _ONE, _ONE, _POSITIVE_DEFINITE, _number(phase), _number(n)),
+        *(values, starts, indices, _NOTHING, _number(b.size // n)),
+        *(parameters, _SILENT, _array(b), _array(x), ctypes.byref(error)),
     )
     return x, error.value
+
+
+def _number(value: int) -> Any:
+    return ctypes.byref(ctypes.c_int32(value))
+
+
+def _array(entries: NDArray[Any]) -> Any:
+    return entries.ctypes.data_as(ctypes.c_void_p)
+
+
+_ONE, _SILENT, _POSITIVE_DEFINITE = _number(1), _number(0), _number(2)
+_NOTHING = _array(np.zeros(1, dtype=np.int32))  # no permutation
 
 
 PACKAGES: dict[type[LinearSolver], str] = {

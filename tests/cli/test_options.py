@@ -76,6 +76,7 @@ NONSENSE = {
     "--solver": NAME,
     "--set": SETTING,
     "--mode": ["", "x", "0", "Replay", "simulate,replay"],
+    "--processes": ["", "x", "Fork", "fork,spawn"],
     "--start": ["", "x", "cold,", "0"],
     "--format": ["", "x", "0", "png,", "PNG "],
     "--camera": ["", "x", "30", "nan,30", "30,91", "inf,0", "1,2,3"],

@@ -13,7 +13,7 @@ from strainbench.problem.conic import ConicForm
 from strainbench.problem.export import as_cbf, as_npz
 from strainbench.problem.kinds import Exact, Kind, Sampled, kind_of
 from strainbench.referee.kkt import kkt_residual
-from strainbench.referee.reference import verify
+from strainbench.referee.reference import Reference
 from strainbench.render.polar import admissible
 from strainbench.solver.registry import find_solver, list_solvers
 from strainbench.solver.solver import warm_up
@@ -56,7 +56,7 @@ def test_a_solver_that_takes_it_finds_the_certified_optimum():
     warm_up(solver, problem, 1e-6)
     found = solve(problem, solver)
     inside = solve(problem.tightened(1e-8), solver, tolerance=1e-9)
-    reference = verify(problem, inside.positions, inside.multipliers)
+    reference = Reference.verified(problem, inside.positions, inside.multipliers)
     certificate = certify(problem, found.positions, reference=reference)
     assert certificate.outcome == "optimal", certificate.reason
     assert certificate.active_constraints > 3
