@@ -27,6 +27,7 @@ from strainbench.cli.interrupt import (
 from strainbench.cli.pictures import draw_polar, render_scene
 from strainbench.cli.report import compare_results, report_results
 from strainbench.cli.run import run_cells
+from strainbench.cli.stability import draw_map
 from strainbench.cli.studies import export_frame, follow_solvers, keep_ledger, let_duel
 from strainbench.escape import terminal
 from strainbench.options import WrongWordError
@@ -79,6 +80,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "duel": let_duel,
     "export": export_frame,
     "ledger": keep_ledger,
+    "map": draw_map,
     "render": render_scene,
     "polar": draw_polar,
 }

@@ -107,9 +107,15 @@ def _numbers(text: str) -> list[float]:
 
 
 class Display(Observer):
-    """A progress bar over all steps, with what is running, and a line for each ended cell."""
+    """A progress bar over all steps, with what is running, and a line for each ended cell.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    lines : whether there are such lines
+    """
+
+    def __init__(self, lines: bool = True) -> None:
+        self.lines = lines
         self.progress = progress("steps,")
         self.running: dict[str, int] = {}
         self.done = self.finished = 0
@@ -125,7 +131,7 @@ class Display(Observer):
     def planned(self, cells: Sequence[Work], skipped: int) -> None:
         """See the base class."""
         self.finished = skipped
-        if skipped:
+        if skipped and self.lines:
             say(f"{skipped} cells finished before; --rerun runs them again")
         self.progress.update(self.task, total=sum(c.steps for c in cells))
 
@@ -147,7 +153,8 @@ class Display(Observer):
         seconds = row.get("solve_seconds_mean", "")
         time = f"{float(str(seconds)):.4f} s a solve" if seconds != "" else "no solve"
         reason = f": {row['reason']}" if row["reason"] else ""
-        say(f"{cell.title}: {time}, {row['outcome']}{reason}")
+        if self.lines:
+            say(f"{cell.title}: {time}, {row['outcome']}{reason}")
         self._show()
 
     def waiting(self, what: str) -> None:
