@@ -125,10 +125,11 @@ class Display(Observer):
     Parameters
     ----------
     debug : end the run at the first cell that fails
+    lines : whether there are such lines
     """
 
-    def __init__(self, debug: bool = False) -> None:
-        self.debug = debug
+    def __init__(self, debug: bool = False, lines: bool = True) -> None:
+        self.debug, self.lines = debug, lines
         self.progress = progress("steps,")
         self.running: dict[str, int] = {}
         self.done = self.finished = 0
@@ -144,9 +145,9 @@ class Display(Observer):
     def planned(self, cells: Sequence[Work], skipped: int) -> None:
         """See the base class."""
         self.finished = skipped
-        if skipped:
+        if skipped and self.lines:
             say(f"{skipped} cells finished before; --rerun runs them again")
-        self.progress.update(self.task, total=sum(c.steps for c in cells))
+        self.progress.update(self.task, total=self.done + sum(c.steps for c in cells))
 
     def started(self, cell: Work) -> None:
         """See the base class."""
@@ -166,7 +167,8 @@ class Display(Observer):
         seconds = row.get("solve_seconds_mean", "")
         time = f"{float(str(seconds)):.4f} s a solve" if seconds != "" else "no solve"
         reason = f": {row['reason']}" if row["reason"] else ""
-        say(f"{cell.title}: {time}, {row['outcome']}{reason}")
+        if self.lines:
+            say(f"{cell.title}: {time}, {row['outcome']}{reason}")
         self._show()
 
     def failed(self, cell: Work, reason: str, printed: str) -> None:

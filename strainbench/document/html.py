@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, Template
 from markdown_it import MarkdownIt
 from markupsafe import Markup, escape
 
-from strainbench.document import Code, Part, Picture, Prose, Strong, blocks
+from strainbench.document import Code, Faint, Part, Picture, Prose, Strong, blocks
 from strainbench.escape import plain
 
 

@@ -31,6 +31,7 @@ VERBS = {
     "converge": ["swing", "--solver", "clarabel", *SMALL, "--frame", "1"],
     "duel": ["swing", *SOLVER, *SMALL, "--frame", "1"],
     "ledger": ["swing", *SMALL, "--steps", "1"],
+    "map": ["swing", "--solver", "none", "--x", "limit=1%,2%", "--y", "step=0.01,0.02"],
     "profile": ["swing", *SOLVER, *SMALL, "--frame", "1"],
     "check": ["none"],
     "testset": ["d", "--small"],
@@ -85,6 +86,9 @@ NONSENSE = {
     "--processes": ["", "x", "Fork", "fork,spawn"],
     "--to": ["", "x", "0.1", "0mm", "-1mm", "nanmm", "1 mile", "20ms"],
     "--within": ["", "x", "20", "0ms", "-1ms", "infs", "1mm"],
+    "--x": ["", "x", "limit", "limit=", "limit=2..1", "limit=1..x", "limit=5"],
+    "--y": ["", "x", "step", "step=1/0..2", "step=1"],
+    "--budget": ["", "x", "20", "0s", "-1min", "1d"],
     "--per": ["", "x", "frame", "Step"],
     "--fail-on": ["", "x", "ratio", "ratio>", "ratio>x", "ratio>0", "ratio<1"],
     "--start": ["", "x", "cold,", "0"],
@@ -92,7 +96,17 @@ NONSENSE = {
     "--camera": ["", "x", "30", "nan,30", "30,91", "inf,0", "1,2,3"],
     "--scale": ["", "x", "0", "-5%", "nan", "inf", "5", "%"],
 }
-FLAGS = {"--rerun", "--units", "--measure", "--help", "--debug", "--optimal", "--scaled", "--small"}
+FLAGS = {
+    "--rerun",
+    "--paper",
+    "--units",
+    "--measure",
+    "--help",
+    "--debug",
+    "--optimal",
+    "--scaled",
+    "--small",
+}
 
 
 def options():

@@ -1,0 +1,88 @@
+"""The verb map: where methods stop to work, over two settings."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strainbench.cli.display import say
+from strainbench.cli.interrupt import keeping
+from strainbench.cli.options import (
+    LOCAL,
+    CellSeconds,
+    Duration,
+    Folder,
+    Jobs,
+    ManyValues,
+    Memory,
+    OneScenario,
+    Solvers,
+    Steps,
+    Tolerance,
+)
+from strainbench.cli.run import Display
+from strainbench.options import shown
+
+if TYPE_CHECKING:
+    from strainbench.bench.cell import Cell
+
+UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+STEPS = 40
+
+
+def draw_map(
+    scenario: OneScenario,
+    solver: Solvers,
+    x: Annotated[str, typer.Option("--x", help="KEY=FROM..TO or KEY=V1,V2, across")],
+    y: Annotated[str, typer.Option("--y", help="the same, upwards")],
+    set_: ManyValues = None,
+    steps: Steps = STEPS,
+    duration: Duration = None,
+    tolerance: Tolerance = 1e-6,
+    time_limit: CellSeconds = 20.0,
+    memory_limit: Memory = None,
+    budget: Annotated[str, typer.Option("--budget", help="as 90s, 20min, 2h")] = "20min",
+    jobs: Jobs = 1,
+    results: Folder = LOCAL / "map",
+) -> None:
+    """Map where methods fail over two settings, refined along the boundaries; resumes."""
+    from strainbench.bench.machine import memory_share
+    from strainbench.bench.plan import plan
+    from strainbench.bench.runner import Settings
+    from strainbench.studies.stability import measure, parse_axis, sentences, write_map
+
+    across, up = parse_axis("--x", x), parse_axis("--y", y)
+    if across.key == up.key:
+        raise ValueError(f"--x and --y are both {shown(across.key)}: two settings make a map")
+    seconds = parse_budget(budget)
+    settings = Settings(results, jobs, memory_limit or memory_share(jobs))
+    asked = None if duration else steps
+
+    def planner(words: Sequence[str]) -> list[Cell]:
+        both = [*(set_ or []), *words]
+        return plan([scenario], solver, both, "simulate", asked, [tolerance], time_limit, duration)
+
+    with Display(lines=False) as display, keeping(lambda: display.kept(display.finished)):
+        found = measure(across, up, planner, settings, seconds, display)
+    for method in found.spots:
+        for sentence in sentences(found, method):
+            say(sentence)
+    if found.open:
+        say(f"the budget of {budget} ended it with {found.open} cells to run; again: it goes on")
+    title = f"{scenario}: {across.key} and {up.key}"
+    command = shlex.join(["strainbench", *sys.argv[1:]])
+    for written in write_map(found, title, command, results):
+        say(f"wrote {written}")
+
+
+def parse_budget(text: str) -> float:
+    """Seconds of 90s, 20min or 2h; ValueError for anything else."""
+    match = re.fullmatch(r"(\d+(?:\.\d+)?)(s|min|h)", text.strip())
+    if not match or float(match[1]) == 0:
+        raise ValueError(f"--budget {shown(text)}: 90s, 20min or 2h is valid")
+    return float(match[1]) * UNITS[match[2]]

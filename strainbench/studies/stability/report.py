@@ -1,0 +1,89 @@
+"""A map as files: its sentences and grids, every cell that was run, a chart a method."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from strainbench.document import Column, Document, Prose, Table
+from strainbench.document.writers import csv, markdown
+from strainbench.files import write_whole
+from strainbench.report.charts import Target, draw
+from strainbench.report.measures import OPTIMAL, SIGNS
+from strainbench.studies.stability.chart import map_chart
+from strainbench.studies.stability.measure import Map
+from strainbench.studies.stability.words import boundary
+
+EXPLANATION = (
+    "✓ optimal on every step, ○ within the limits on every step, ✗ neither. In brackets: not run, "
+    "as the cells around agree. A sentence names the two cells between which a method changes; "
+    "where outcomes along a line change more than once it says irregular."
+)
+CELLS = (
+    *("method", "x", "y", "outcome", "why", Column("first failing step"), Column("share of steps")),
+    *(Column("median", "s"), "cell"),
+)
+
+
+def write_map(found: Map, title: str, command: str, folder: Path) -> list[Path]:
+    """map.md, map.csv, and map-METHOD.svg and .pdf."""
+    texts = {
+        "map.md": markdown(as_document(found, title, command)),
+        "map.csv": csv(Table("", CELLS, list(_cells(found)))),
+    }
+    for name, text in texts.items():
+        write_whole(folder / name, text.encode())
+    paths = [folder / name for name in texts]
+    for method in found.spots:
+        for ending, target in ((".svg", Target.PAGE), (".pdf", Target.PAPER)):
+            paths.append(folder / f"map-{method.replace('/', '-')}{ending}")
+            draw(map_chart(found, method, target), paths[-1])
+    return paths
+
+
+def as_document(found: Map, title: str, command: str) -> Document:
+    """The boundary of each method in words, then its grid."""
+    counts = [len(spots) for spots in found.spots.values()]
+    whole = found.shape[0] * found.shape[1] * len(counts)
+    about = f"{sum(counts)} cells were run of the {whole} of the full grids."
+    if found.open:
+        about += f" The budget ended it with {found.open} more to run: the same command goes on."
+    sections = [_section(found, method) for method in found.spots]
+    return Document(title, [about, Prose(EXPLANATION), f"Made by {command}", *sections])
+
+
+def _section(found: Map, method: str) -> Document:
+    lines = [
+        [found.y.shown[j], *(_sign(found, method, i, j) for i in range(len(found.x.words)))]
+        for j in reversed(range(len(found.y.words)))
+    ]
+    corner = f"{found.y.key} \\ {found.x.key}"
+    return Document(method, [*sentences(found, method), Table("", [corner, *found.x.shown], lines)])
+
+
+def sentences(found: Map, method: str) -> list[str]:
+    """Where a method keeps the limits, and where it reaches the optimum."""
+    spots = found.spots[method]
+    kept = {point: spot.holds for point, spot in spots.items()}
+    said = [f"{method} {line}." for line in boundary(found.x, found.y, kept)]
+    if any(spot.ending == OPTIMAL for spot in spots.values()):
+        best = {point: spot.ending == OPTIMAL for point, spot in spots.items()}
+        if best != kept:
+            lines = "; ".join(boundary(found.x, found.y, best))
+            said.append(f"The optimum on every step: {lines}.")
+    return said
+
+
+def _sign(found: Map, method: str, i: int, j: int) -> str:
+    ending = found.endings(method).get((i, j))
+    if ending is None:
+        return ""
+    return SIGNS[ending] if (i, j) in found.spots[method] else f"({SIGNS[ending]})"
+
+
+def _cells(found: Map) -> Iterator[tuple[object, ...]]:
+    for method, spots in found.spots.items():
+        for (i, j), spot in sorted(spots.items()):
+            where = found.x.shown[i], found.y.shown[j]
+            end = spot.ending, spot.why, spot.step, spot.share
+            yield (method, *where, *end, spot.seconds, spot.cell)

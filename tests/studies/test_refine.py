@@ -1,0 +1,106 @@
+"""Adaptive maps find all that differs on smooth boundaries, with few points."""
+
+from itertools import pairwise, product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from strainbench.studies.stability.axis import Axis, parse_axis
+from strainbench.studies.stability.refine import inferred, wanted
+from strainbench.studies.stability.words import boundary
+
+
+def evaluated(shape, truth, stride=4):
+    """The points evaluated until nothing is wanted, and the whole map."""
+    known = {}
+    while missing := wanted(shape, known, stride):
+        assert not missing & known.keys()
+        known |= {point: truth(*point) for point in missing}
+    return known, inferred(shape, known, stride)
+
+
+@pytest.mark.parametrize("stride", [2, 4, 8])
+@pytest.mark.parametrize("slope", [-1.3, 0.2, 1.0, 4.0])
+def test_a_boundary_is_found_whole_with_few_points(stride, slope):
+    shape = 24, 16
+
+    def truth(i, j):
+        return "fails" if j > slope * (i - 9) + 6 else "holds"
+
+    known, found = evaluated(shape, truth, stride)
+    assert found == {p: truth(*p) for p in product(*map(range, shape))}
+    assert len(known) < 0.62 * 24 * 16
+
+
+def test_one_outcome_needs_the_corners_alone():
+    known, found = evaluated((24, 16), lambda *_: "holds")
+    assert len(known) == 7 * 5
+    assert set(found.values()) == {"holds"}
+    assert len(found) == 24 * 16
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 2**31))
+def test_it_ends_and_every_pair_that_differs_was_evaluated(width, height, seed):
+    outcomes = "ab" if seed % 2 else "aaab"
+
+    def truth(i, j):
+        return outcomes[hash((i, j, seed)) % len(outcomes)]
+
+    known, found = evaluated((width, height), truth)
+    assert len(found) == width * height
+    for (i, j), outcome in found.items():
+        for other in ((i + 1, j), (i, j + 1)):
+            if other in found and found[other] != outcome:
+                assert {(i, j), other} <= known.keys()
+    assert all(found[p] == truth(*p) for p in known)
+
+
+def test_a_range_has_levels_no_more_than_the_factor_apart():
+    axis = parse_axis("--x", "limit=0.01%..20%")
+    assert (axis.key, axis.shown[0], axis.shown[-1]) == ("limit", "0.01%", "20%")
+    values = [float(w.rstrip("%")) for w in axis.shown]
+    assert max(b / a for a, b in pairwise(values)) < 1.31
+    steps = parse_axis("--y", "step=1/240..1/5")
+    assert steps.shown[0] == "1/240"
+    assert float(steps.words[0]) == pytest.approx(1 / 240)
+    assert parse_axis("--x", "resolution=5..20").words == ("5", "6", "8", "10", "13", "16", "20")
+    assert parse_axis("--x", "directions=2,4,8").words == ("2", "4", "8")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "limit",
+        "limit=",
+        "=1..2",
+        "limit=2..1",
+        "limit=0..1",
+        "limit=a..b",
+        "limit=1..1",
+        "limit=5",
+        "limit=1/0..2",
+        "limit=1e-30..1e30",
+    ],
+)
+def test_words_that_are_no_axis(text):
+    with pytest.raises(ValueError, match=r"^--x .*valid"):
+        parse_axis("--x", text)
+
+
+def test_boundaries_in_words():
+    x = Axis("limit", ("1", "2", "3"), ("1%", "2%", "3%"))
+    y = Axis("step", ("1", "2", "3", "4"), ("1/4", "1/3", "1/2", "1"))
+    rows = ["FHH", "FHH", "FFF", "HFH"]
+    holds = {(i, j): c == "H" for j, row in enumerate(rows) for i, c in enumerate(row)}
+    assert boundary(x, y, holds) == [
+        "holds from limit 2% on (fails at 1%) at step 1/4 to 1/3",
+        "fails at every limit at step 1/2",
+        "irregular between limit 1% and 3% at step 1",
+    ]
+    always = dict.fromkeys(holds, True)
+    assert boundary(x, y, always) == ["holds at every limit everywhere"]
+    del always[0, 0]
+    always[2, 0] = False
+    assert boundary(x, y, always)[0] == "holds up to limit 2% (fails at 3%) at step 1/4"

@@ -1,0 +1,59 @@
+"""The verb map runs cells along boundaries, resumes, and says the boundary in words."""
+
+from __future__ import annotations
+
+import csv
+import re
+
+import pytest
+
+from strainbench.bench.columns import RUN_COLUMNS
+from strainbench.bench.records import RUNS, read_rows
+from strainbench.cli.stability import parse_budget
+from tests.cli.test_cli import strainbench
+
+GENTLE = """
+from dataclasses import dataclass
+from strainbench import Solution, Solver
+
+@dataclass(frozen=True)
+class Gentle(Solver):
+    '''Answers the target below a limit of 5%, and nothing above (nobody).'''
+    name = "gentle"
+
+    def solve(self, problem, state, *, tolerance, monitor, deadline):
+        x = problem.target.copy()
+        return Solution(x * (float("nan") if problem.bounds.max() < 1.05 else 1), "solved", 0)
+"""
+
+
+@pytest.mark.slow
+def test_a_map_is_made_and_goes_on(tmp_path):
+    (tmp_path / "gentle.py").write_text(GENTLE)
+    words = ["map", "stretch-square", "--solver", "./gentle.py", "--results", "out"]
+    words += ["--x", "limit=2%..10%", "--y", "directions=2,4", "--steps", "1"]
+    words += ["--set", "resolution=2", "--set", "scale_x=1", "--set", "scale_y=1"]
+    out = strainbench(*words, cwd=tmp_path).stdout
+    assert re.search(r"gentle holds from limit [56][.\d]*% on \(fails at [45][.\d]*%\)", out)
+    rows = read_rows(tmp_path / "out" / RUNS, RUN_COLUMNS)
+    with (tmp_path / "out" / "map.csv").open() as file:
+        spots = list(csv.DictReader(file))
+    assert {s["cell"] for s in spots} == {r["cell"] for r in rows}
+    assert {s["outcome"] for s in spots} == {"optimal", "no answer"}
+    assert 6 <= len(rows) <= 2 * 8
+    assert "(✓)" in (tmp_path / "out" / "map.md").read_text()
+    assert (tmp_path / "out" / "map-gentle.pdf").read_bytes()[:4] == b"%PDF"
+    again = strainbench(*words, cwd=tmp_path).stdout
+    assert len(read_rows(tmp_path / "out" / RUNS, RUN_COLUMNS)) == len(rows)
+    assert "gentle holds from limit" in again
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("90s", 90), ("20min", 1200), ("1.5h", 5400)])
+def test_budgets(text, seconds):
+    assert parse_budget(text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "20", "0s", "min", "-1s", "1d", "nan s"])
+def test_budgets_that_are_none(text):
+    with pytest.raises(ValueError, match=r"^--budget .* is valid"):
+        parse_budget(text)
