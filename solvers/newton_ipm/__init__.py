@@ -80,6 +80,7 @@ PATIENCE = 25  # iterations after which a warm start is given up
 WIDTHS = 2e-8, 1e-10, 1e-12, 1e-13  # of wider limits; below, slacks are rounding
 FAR = 1e-7  # errors below are rounding's: no other way out is tried
 STALL, JAM = 12, 30  # iterations without progress, below an error of 1e-3 and above
+NEARER = 0.999  # of the violation: from a candidate far away the gap grows for 40 iterations
 ROUGH, ROUGH_ITERATIONS = 0.1, 40  # of projections onto wider limits
 
 
@@ -190,7 +191,7 @@ multipliers have no bound, and the referee's may price a violation higher than t
         """Steps 2 to 6; and the least error, which is the solution's."""
         iterate = Iterate(problem, state, warm, tolerance)
         warm = resumed = iterate.begin()
-        best, best_at, kept = np.inf, 0, None
+        best, best_at, kept, least = np.inf, 0, None, np.inf
         status = "iteration limit"
         for k in range(self.max_iterations + 1):
             with section("measure"):
@@ -199,6 +200,8 @@ multipliers have no bound, and the referee's may price a violation higher than t
                 monitor(iterate.x, iterate.Y)
             if error < best:
                 best, best_at, kept = error, k, (iterate.x, iterate.Y)
+            if max(0.0, iterate.violation) < NEARER * least:
+                least, best_at = iterate.violation, k
             if error <= tolerance:  # 2
                 state.compare(k, resumed)
                 return Solution(iterate.x, "solved", k, iterate.Y), error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scenarios.drape import Drape
 from solvers.newton_ipm import Iterate, NewtonIPM, State
 from strainbench import Problem, StretchLimits, certify, solve
 from strainbench.problem.grid import square_grid
@@ -443,3 +444,20 @@ def test_candidates_take_as_many_iterations_as_ever(kind):
     """Within one: far from the limits the last ones are rounding's."""
     found = [answer(sheet(kind, 1e-2, make)).iterations for make in CANDIDATES.values()]
     assert found == pytest.approx(ITERATIONS[kind], abs=1)
+
+
+@pytest.mark.slow
+def test_a_candidate_far_away_is_no_stall():
+    """The gap grows for 40 iterations, while the violation falls from 313 by 0.01 an iteration."""
+    scene = Drape(resolution=30, shape="anisotropic")
+    problem, candidates = scene.problem(), []
+
+    def keep(target):
+        candidates.append(problem.with_target(target))
+        return problem.target
+
+    next(scene.play(keep))
+    found = solve(candidates[0], "newton-ipm")
+    assert candidates[0].violations(candidates[0].target).max() > 300
+    assert (found.status, found.iterations) == ("solved", pytest.approx(105, abs=5))
+    assert not np.any(candidates[0].violations(found.positions) > 1e-6)
