@@ -154,7 +154,7 @@ def test_convergence_is_not_written_beside_another_run(tmp_path):
 
 
 def test_a_report_that_cannot_be_written_is_a_line_and_status_1(tmp_path):
-    write_rows(tmp_path / RUNS, RUN_COLUMNS, [run_row(scenario_parameters="{}")])
+    write_rows(tmp_path / RUNS, RUN_COLUMNS, [run_row(scenario_parameters="{}", details_mean="{}")])
     (tmp_path / "table1.csv").mkdir()
     done = strainbench(tmp_path, "report", "--results", str(tmp_path))
     assert done.returncode == 1

@@ -31,7 +31,7 @@ def report_results(
     from strainbench.files import disk_errors
 
     if not paper and (methods or columns) is not None:
-        raise WrongWordError("--methods and --columns choose what --paper writes: give it too")
+        raise WrongWordError("--methods and --columns choose what --paper writes: valid with --paper")
     place = results.parent if results.suffix == BENCHMARKS else results
     with disk_errors(place), tracking() as track:
         if results.suffix == BENCHMARKS:

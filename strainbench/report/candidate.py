@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from strainbench.bench.cell import PluginRef
+from strainbench.bench.columns import STEP_COLUMNS
 from strainbench.bench.load import OTHER_WORK
 from strainbench.fields import default_of, plain
 from strainbench.report.measures import (
@@ -150,7 +151,8 @@ class Records:
         for _, row in rows.iterrows():
             steps = self.steps.get((row["folder"], row["cell"]))
             how = ", ".join(HOW[name].format(row[name]) for name in apart)
-            yield _candidate(question, row, how, pd.DataFrame() if steps is None else steps)
+            none = pd.DataFrame(columns=list(STEP_COLUMNS))
+            yield _candidate(question, row, how, none if steps is None else steps)
 
 
 def _agree(asked: Mapping[str, object], found: Mapping[str, object], kind: type) -> bool:

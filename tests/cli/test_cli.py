@@ -175,5 +175,5 @@ def test_answers_under_lower_bounds_are_reported_as_local(tmp_path):
     assert residuals[0] < 1e-4 < residuals[1]
     assert strainbench("report", "--results", "out", cwd=tmp_path).returncode == 0
     table = (tmp_path / "out" / "table1.md").read_text()
-    for words in ("0 · local |", "at best a local optimum", "it has no form for lower bounds"):
+    for words in ("| 0 | local |", "at best a local optimum", "it has no form for lower bounds"):
         assert words in table

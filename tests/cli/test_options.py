@@ -89,6 +89,8 @@ NONSENSE = {
     "--x": ["", "x", "limit", "limit=", "limit=2..1", "limit=1..x", "limit=5"],
     "--y": ["", "x", "step", "step=1/0..2", "step=1"],
     "--budget": ["", "x", "20", "0s", "-1min", "1d"],
+    "--methods": ["", "x"],
+    "--columns": ["", "x", "seconds,x"],
     "--per": ["", "x", "frame", "Step"],
     "--fail-on": ["", "x", "ratio", "ratio>", "ratio>x", "ratio>0", "ratio<1"],
     "--start": ["", "x", "cold,", "0"],

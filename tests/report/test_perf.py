@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import subprocess
 import sys
 from xml.etree import ElementTree
@@ -74,8 +75,14 @@ def test_report_reads_what_pytest_benchmark_writes(tmp_path, monkeypatch, capsys
     (tmp_path / "test_waits.py").write_text(BENCHMARKS)
     file = tmp_path / "perf.json"
     words = ["-m", "pytest", "-q", "-p", "no:cacheprovider", f"--benchmark-json={file}", "."]
+    alone = {k: v for k, v in os.environ.items() if not k.startswith("PYTEST_XDIST")}
     made = subprocess.run(
-        [sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, check=False
+        [sys.executable, *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=alone,  # beside others it would not measure
     )
     assert made.returncode == 0, made.stdout
     done = command(monkeypatch, capsys, "report", "--results", file, width=80)

@@ -34,7 +34,7 @@ def test_a_map_is_made_and_goes_on(tmp_path):
     words += ["--x", "limit=2%..10%", "--y", "directions=2,4", "--steps", "1"]
     words += ["--set", "resolution=2", "--set", "scale_x=1", "--set", "scale_y=1"]
     out = strainbench(*words, cwd=tmp_path).stdout
-    assert re.search(r"gentle holds from limit [56][.\d]*% on \(fails at [45][.\d]*%\)", out)
+    assert re.search(r"gentle holds from limit [56][.\d]*% on \(fails at [34][.\d]*%\)", out)
     rows = read_rows(tmp_path / "out" / RUNS, RUN_COLUMNS)
     with (tmp_path / "out" / "map.csv").open() as file:
         spots = list(csv.DictReader(file))

@@ -59,13 +59,11 @@ def papers(title: str, rows: Sequence[Mapping[str, object]], scaled: bool) -> di
     rows : of the index
     scaled : whether CBF has units of its own
     """
-    licence = distribution("strainbench").read_text("licenses/LICENSE")
-    if licence is None:
-        raise ValueError("the installed strainbench has no licence among its files")
+    licence = next(f for f in distribution("strainbench").files or [] if f.name == "LICENSE")
     citation = CITATION.format(title=title.replace('"', "'"), version=__version__)
     return {
         "README.md": markdown(_readme(title, rows, scaled)),
-        "LICENSE": licence,
+        "LICENSE": licence.read_binary().decode(),
         "CITATION.cff": citation,
     }
 
