@@ -30,8 +30,10 @@ def report_results(
     """
     from strainbench.files import disk_errors
 
-    if not paper and (methods or columns) is not None:
-        raise WrongWordError("--methods and --columns choose what --paper writes: valid with --paper")
+    if not paper and not (methods is None and columns is None):
+        raise WrongWordError(
+            "--methods, --columns choose what --paper writes: valid with it alone"
+        )
     place = results.parent if results.suffix == BENCHMARKS else results
     with disk_errors(place), tracking() as track:
         if results.suffix == BENCHMARKS:
