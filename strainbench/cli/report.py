@@ -31,9 +31,7 @@ def report_results(
     from strainbench.files import disk_errors
 
     if not paper and not (methods is None and columns is None):
-        raise WrongWordError(
-            "--methods, --columns choose what --paper writes: valid with it alone"
-        )
+        raise WrongWordError("--methods, --columns choose what --paper writes: valid with it alone")
     place = results.parent if results.suffix == BENCHMARKS else results
     with disk_errors(place), tracking() as track:
         if results.suffix == BENCHMARKS:

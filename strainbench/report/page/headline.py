@@ -80,7 +80,8 @@ def _counted(solved: Sequence[Race], unsolved: int) -> Sentence:
         ratios = [r.next[1] for r in alone if r.first == [name] and r.next[0]]
         span = dict.fromkeys((digits(min(ratios)), digits(max(ratios)))) if ratios else {}
         after = f", {' to '.join(span)} times sooner than the next" if span else ""
-        begins = f" reaches the optimum first in {count(most)} of {total} cases{after}"
+        part = f"all {count(total)}" if most == total else f"{count(most)} of {count(total)}"
+        begins = f" reaches the optimum first in {part} cases{after}"
         clauses = [[Strong(name), begins], *clauses]
     if level := len(solved) - len(alone):
         clauses.append([f"in {count(level)} the first are level"])
