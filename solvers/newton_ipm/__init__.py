@@ -47,12 +47,13 @@ times that of the optimum's objective makes less than one iteration of differenc
 many. Warm, with slacks kept instead of widened it takes 11 to 17, and from the last positions
 unmoved 10 to 25, where it takes 7.
 
-Where the time goes at 60 cells, in factorisations: an iteration takes 1.75, one for the matrix's
-factor, 0.1 for its assembly, 0.6 for three to four solves with what goes before and after each,
-0.05 for the measurement. Each step is one compiled loop over the elements (measure, assemble, aim,
-push, change), which does its algebra and its sums on the way: as passes over arrays they took 2.15.
-Blocks summed by material axes before they go to vertex pairs, and stored as their six entries,
-took the assembly from 0.23 to 0.08.
+Where the time goes, in units of one factorisation and solve, as it is printed by `strainbench
+profile swing --set resolution=60 --frame 20 --solver newton-ipm`: an iteration takes 1.83, of
+them 0.94 for the matrix's factor, 0.09 for its assembly, 0.70 for three to four solves with what
+goes before and after each, 0.05 for the measurement. Each step is one compiled loop over the
+elements (measure, assemble, aim, push, change), which does its algebra and its sums on the way.
+Blocks are summed by material axes before they go to vertex pairs, and stored as their six
+entries.
 
 What brought nothing: first multipliers weighted by violation, first slacks in proportion to it, a
 start from the positions of up to 300 Gauss-Seidel sweeps (feasible ones matter less than a first

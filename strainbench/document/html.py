@@ -29,14 +29,15 @@ def inline(text: str) -> Markup:
     return Markup(f"<{tag}>{words}</{tag}>") if tag else words
 
 
+def templates(package: str) -> Environment:
+    """Those of a package, whose values are escaped."""
+    loader = PackageLoader(package, ".")
+    return Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
+
+
 @cache
 def _template() -> Template:
-    environment = Environment(
-        loader=PackageLoader("strainbench.document", "."),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = templates("strainbench.document")
     environment.filters |= {"inline": inline, "drawing": _drawing, "kind": _kind}
     return environment.get_template("part.html")
 

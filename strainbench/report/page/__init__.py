@@ -7,10 +7,11 @@ from functools import cache
 from pathlib import Path
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader, Template
+from jinja2 import Template
 from markupsafe import Markup
 
 from strainbench.document import Strong
+from strainbench.document.html import templates
 from strainbench.escape import plain
 from strainbench.progress import Track, untracked
 from strainbench.report.identity import look
@@ -146,12 +147,7 @@ def _few(values: Iterable[str], form: str) -> list[str]:
 
 @cache
 def _template() -> Template:
-    environment = Environment(
-        loader=PackageLoader("strainbench.report.page", "."),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    environment = templates("strainbench.report.page")
     environment.filters["plain"] = plain
     environment.tests["strong"] = lambda piece: isinstance(piece, Strong)
     environment.globals["mark"] = _mark
