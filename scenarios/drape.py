@@ -6,9 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.integrate import cumulative_simpson
-from scipy.optimize import brentq
-from scipy.special import j0
+import scipy
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.body import gravity_of
@@ -178,9 +176,13 @@ def pleat(s: FloatArray, gather: float, folds: int) -> tuple[FloatArray, FloatAr
     Its angle is A sin(2 pi folds s), so that its ends are J0(A) = 1 - gather apart, on z = 0,
     and x = 0 in the middle.
     """
-    A = 0.0 if gather == 0 else float(brentq(lambda a: j0(a) - (1 - gather), 0, 2.4))
+    A = (
+        0.0
+        if gather == 0
+        else float(scipy.optimize.brentq(lambda a: scipy.special.j0(a) - (1 - gather), 0, 2.4))
+    )
     t = np.linspace(0, 1, 400 * folds + 1)
     angle = A * np.sin(2 * np.pi * folds * t)
-    x = cumulative_simpson(np.cos(angle), x=t, initial=0)
-    z = cumulative_simpson(np.sin(angle), x=t, initial=0)
+    x = scipy.integrate.cumulative_simpson(np.cos(angle), x=t, initial=0)
+    z = scipy.integrate.cumulative_simpson(np.sin(angle), x=t, initial=0)
     return np.interp(s, t, x - x[-1] / 2), np.interp(s, t, z)

@@ -6,20 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import clarabel
 import numpy as np
-import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver, section
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray
+from strainbench.plugins import Library
 from strainbench.problem.conic import ConicForm
 from strainbench.problem.kinds import Sampled
 from strainbench.solver.claim import claimed
 
-CONES = {
-    "second-order": clarabel.SecondOrderConeT,
-    "semidefinite": clarabel.PSDTriangleConeT,
-}
+clarabel = Library("clarabel")
+
+CONES = {"second-order": "SecondOrderConeT", "semidefinite": "PSDTriangleConeT"}
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ class QuadraticForm:
             q,
             sp.csc_matrix(self.form.A),
             rhs,
-            [CONES[self.form.cone](self.form.order)] * self.form.count,
+            [getattr(clarabel, CONES[self.form.cone])(self.form.order)] * self.form.count,
             settings,
         )
 

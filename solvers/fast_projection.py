@@ -30,10 +30,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.linalg import splu
+import scipy
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.leverage import Leverage, free_numbers
 
@@ -167,7 +167,7 @@ class Newton:
     def newton_step(self, J: sp.csr_array, C: FloatArray, eps_D: FloatArray) -> FloatArray:
         """(3 n,) dx of the normal equations."""
         A = sp.diags_array(self._mass) + J.T @ (sp.diags_array(1 / eps_D) @ J)
-        factor = splu(
+        factor = scipy.sparse.linalg.splu(
             sp.csc_matrix(A),
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,

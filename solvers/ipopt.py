@@ -14,16 +14,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import cyipopt
 import numpy as np
-import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.plugins import Library
 from strainbench.problem.leverage import Pairs
 from strainbench.solver.claim import claimed
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
+
+cyipopt = Library("cyipopt")
 
 STATUS = {
     0: "solved",

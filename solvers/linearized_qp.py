@@ -27,14 +27,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import osqp
-import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray
+from strainbench.plugins import Library
 from strainbench.problem.dual import dual_bound
 from strainbench.solver.memory import Memory
 from strainbench.solver.solver import held_still
+
+osqp = Library("osqp")
 
 REFUSED = "refused by OSQP"
 ITERATIONS = 1000

@@ -11,13 +11,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import qoco
-import scipy.sparse as sp
 
 from strainbench import Clock, Problem, Solution, Solver
+from strainbench import sparse as sp
+from strainbench.plugins import Library
 from strainbench.problem.conic import ConicForm
 from strainbench.solver.claim import claimed
 from strainbench.solver.solver import held_still
+
+qoco = Library("qoco")
 
 
 @dataclass(frozen=True)

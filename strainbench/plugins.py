@@ -6,6 +6,7 @@ import ast
 import difflib
 import hashlib
 import importlib
+import importlib.util
 import inspect
 import pkgutil
 import re
@@ -15,7 +16,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from strainbench.beside import OURS, Beside
 from strainbench.escape import plain
@@ -35,6 +36,26 @@ class Listed:
     method: str
     paper: str
     unavailable: str | None = None
+
+
+class Library:
+    """A package that is imported when something of it is first asked for.
+
+    So that a solver is listed without it: cvxpy alone takes a second.
+
+    Raises
+    ------
+    ModuleNotFoundError
+        At once, if it is not installed.
+    """
+
+    def __init__(self, name: str) -> None:
+        if importlib.util.find_spec(name) is None:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+        self._name = name
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(importlib.import_module(self._name), name)
 
 
 def _package(name: str) -> ModuleType:

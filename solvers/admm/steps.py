@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
 from strainbench import Problem
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray
 from strainbench.compiled import compiled
 from strainbench.physics.linear import SuperLU

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter
 
-import cvxpy as cp
-
 from solvers.cvxpy.backends import (
     BACKENDS,
     SEMIDEFINITE,
@@ -15,7 +13,7 @@ from solvers.cvxpy.backends import (
     missing,
     time_options,
 )
-from solvers.cvxpy.model import Model
+from solvers.cvxpy.model import Model, cp
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.solver.claim import claimed
 from strainbench.solver.solver import held_still

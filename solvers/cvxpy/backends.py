@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
+from functools import cache
+from importlib.util import find_spec
 from typing import Any
-
-import cvxpy as cp
 
 from strainbench import Clock
 
 BACKENDS = ("CLARABEL", "ECOS", "SCS", "QOCO", "MOSEK")
+"""Each is a package of this name."""
 SEMIDEFINITE = ("CLARABEL", "SCS", "MOSEK")
 
 
 def missing(backend: str) -> str | None:
     """Why a backend cannot be used here, or None."""
-    installed = [name for name in BACKENDS if name in cp.installed_solvers()]
+    installed = [name for name in BACKENDS if find_spec(name.lower())]
     if backend not in installed:
         found = ", ".join(installed)
         return f"cvxpy's backend {backend} is not installed; installed: {found}"
     return no_licence() if backend == "MOSEK" else None
 
 
+@cache
 def no_licence() -> str | None:
     """Why MOSEK cannot be used, where it is installed."""
     import mosek

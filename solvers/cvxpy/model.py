@@ -6,12 +6,14 @@ import warnings
 from time import perf_counter
 from typing import Any
 
-import cvxpy as cp
 import numpy as np
-import scipy.sparse as sp
 
 from strainbench import Problem
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray
+from strainbench.plugins import Library
+
+cp = Library("cvxpy")
 
 SCALING = 16.0  # of the objective in units of 1/edge^2 over the mean mass, as `clarabel` has it
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 
 from strainbench import Problem
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.compiled import compiled
 from strainbench.physics.pattern import Pattern

@@ -129,7 +129,7 @@ def _what_is_loaded(stage: Stage) -> dict[str, object]:
 def start_warming(journal: Journal) -> None:
     """Tell of the warm-up, and of what numba compiles, which is not to be taken for a hang."""
     journal.write("warming")
-    if "numba" in sys.modules:
+    if "strainbench.compiled" in sys.modules:
         _tell_of_compilation(journal)
 
 

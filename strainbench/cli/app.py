@@ -27,6 +27,7 @@ from strainbench.cli.interrupt import (
     terminate,
 )
 from strainbench.cli.kit import check_solvers, profile_solver
+from strainbench.cli.overview import Verbs
 from strainbench.cli.pictures import draw_polar, render_scene
 from strainbench.cli.report import compare_results, report_results
 from strainbench.cli.run import run_cells
@@ -37,6 +38,7 @@ from strainbench.options import WrongWordError
 from strainbench.progress import SceneWarning
 
 app = typer.Typer(
+    cls=Verbs,
     add_completion=False,
     pretty_exceptions_enable=False,
     help="Benchmark strain-limiting solvers for cloth: same scenes, one referee.",

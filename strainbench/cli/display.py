@@ -4,20 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
 
 from strainbench.escape import plain, terminal
 from strainbench.progress import Track, Work
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 console = Console()
 errors = Console(stderr=True, soft_wrap=True, highlight=False)
@@ -30,6 +25,16 @@ def say(line: object, on: Console = console) -> None:
 
 def progress(of: str = "") -> Progress:
     """A progress bar with what is done, `of` what, and the time it takes."""
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        SpinnerColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     unit = [TextColumn(of)] if of else []
     return Progress(
         SpinnerColumn(),

@@ -29,11 +29,11 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 from threadpoolctl import ThreadpoolController, threadpool_info
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray
 
 
@@ -111,7 +111,9 @@ class SuperLU(LinearSolver):
 
 
 def _lu(matrix: sp.csc_array, ordering: str) -> Any:
-    return splu(matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return scipy.sparse.linalg.splu(
+        matrix, permc_spec=ordering, diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
 
 
 class Cholmod(LinearSolver):

@@ -17,8 +17,8 @@ from collections.abc import Iterable, Iterator
 from itertools import repeat
 
 import numpy as np
-import scipy.sparse as sp
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.conic import ConicForm
 

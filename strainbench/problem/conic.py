@@ -18,8 +18,8 @@ quadratic, without a cone of its own. A constraint's block of s is
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.problem import Problem
 

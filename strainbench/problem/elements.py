@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray, read_only
 
 

@@ -35,9 +35,9 @@ from zipfile import BadZipFile, ZipFile, ZipInfo
 
 import numpy as np
 import psutil
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from strainbench import sparse as sp
 from strainbench.files import open_folder
 from strainbench.options import shown
 from strainbench.problem.cbf import cbf_text

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import scipy.sparse as sp
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.problem import Problem
 

@@ -17,9 +17,9 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray, frozen_array, read_only
 from strainbench.problem import checks
 from strainbench.problem.elements import rest_corners, shape_gradients, sparse_rows

@@ -6,9 +6,9 @@ from itertools import combinations
 from typing import Protocol
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import dijkstra
+import scipy
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 
 ROUNDING = 4 * np.finfo(float).eps  # of a unit length
@@ -52,7 +52,7 @@ def distances(edges: IntArray, lengths: FloatArray, vertices: int, pins: IntArra
     if len(pins) == 0:
         return np.zeros((0, vertices))
     graph = sp.csr_array((lengths, (edges[:, 0], edges[:, 1])), shape=2 * (vertices,))
-    reach: FloatArray = dijkstra(graph, directed=False, indices=pins)
+    reach: FloatArray = scipy.sparse.csgraph.dijkstra(graph, directed=False, indices=pins)
     return reach
 
 

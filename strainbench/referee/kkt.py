@@ -16,12 +16,14 @@ are necessary, and hold at saddles too, such as a flat sheet that would rather f
 
 from __future__ import annotations
 
-import clarabel
 import numpy as np
-import scipy.sparse as sp
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.plugins import Library
 from strainbench.problem.problem import Problem
+
+clarabel = Library("clarabel")
 
 NEAR = 1e-5
 """Limits this close to their bound count as active. Interior-point answers at a tolerance of 1e-6

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
+import scipy
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 
 
@@ -27,7 +27,7 @@ def parts(elements: IntArray, pins: IntArray) -> tuple[int, int]:
     ends = np.concatenate([elements[:, :2], elements[:, 1:]])
     n = int(elements.max()) + 1
     graph = sp.coo_array((np.ones(len(ends)), tuple(ends.T)), shape=(n, n))
-    count, label = connected_components(graph, directed=False)
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     return count, count - len(np.unique(label[pins]))
 
 
@@ -60,7 +60,7 @@ def level_openings(positions: FloatArray, elements: IntArray) -> str:
     directed, which, count = _edges(elements)
     rim = directed[count[which] == 1]
     n = len(positions)
-    _, label = connected_components(
+    _, label = scipy.sparse.csgraph.connected_components(
         sp.coo_array((np.ones(len(rim)), tuple(rim.T)), shape=(n, n)), directed=False
     )
     x = positions - positions.mean(axis=0)

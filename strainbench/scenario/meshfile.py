@@ -10,12 +10,14 @@ from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
-import meshio
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
+from strainbench.plugins import Library
 from strainbench.scenario.obj import read_obj, shortened
 from strainbench.scenario.polygons import Polygons, triangulated
+
+meshio = Library("meshio")
 
 
 @dataclass(frozen=True, eq=False)

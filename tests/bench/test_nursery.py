@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import random
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -191,6 +192,26 @@ def test_a_fork_whose_nursery_dies_goes_on(tmp_path):
         assert code_of(child) == LOST
         late = ours.start(sleeping, (folder / "late",), made(tmp_path / "b"), nursery.forked)
         assert code_of(late) == -signal.SIGKILL
+
+
+@pytest.mark.slow
+def test_what_is_imported_when_it_is_used_is_loaded_beforehand():
+    names = ["clarabel", "cvxpy", "linearized-qp", "qoco"]
+    done = subprocess.run(
+        [sys.executable, "-c", LOADING, *names], capture_output=True, text=True, check=True
+    )
+    wanted = {"numba", "scipy.sparse", "clarabel", "cvxpy", "osqp", "qoco"}
+    assert wanted <= set(done.stdout.split())
+
+
+LOADING = """
+import sys
+from strainbench.bench.preload import load_solver, load_suite
+load_suite()
+for name in sys.argv[1:]:
+    load_solver(name)
+print(*sys.modules)
+"""
 
 
 def peak(path):

@@ -218,16 +218,35 @@ def test_without_a_word_the_help_is_shown(monkeypatch, capsys):
     assert set(cli.VERBS) == set(commands)
 
 
-def test_help_and_version_import_nothing_heavy():
-    words = "import sys; sys.argv = ['strainbench', '--help']; import strainbench.cli as cli\n"
-    look = (
-        "try: cli.main()\nfinally: print(*{m.split('.')[0] for m in sys.modules}, file=sys.stderr)"
-    )
+def loaded_by(word):
+    """What the command prints, and the modules that it has loaded by then."""
+    words = f"import sys; sys.argv = ['strainbench', {word!r}]; import strainbench.cli as cli\n"
+    look = "try: cli.main()\nfinally: print(*sys.modules, file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", words + look], capture_output=True, text=True)
-    assert "Usage: " in done.stdout
-    heavy = {"numpy", "scipy", "numba", "pandas", "matplotlib", "cvxpy", "psutil", "distributed"}
     assert "typer" in done.stderr.split()
-    assert not heavy & set(done.stderr.split())
+    return done.stdout, set(done.stderr.split())
+
+
+def test_help_and_version_import_nothing_heavy():
+    shown, modules = loaded_by("--help")
+    assert "Usage: " in shown
+    heavy = {"numpy", "scipy", "numba", "pandas", "matplotlib", "cvxpy", "psutil", "distributed"}
+    assert not heavy & {module.split(".")[0] for module in modules}
+    assert not {"rich.markdown", "rich.progress"} & modules
+
+
+def test_a_list_imports_no_solver_s_library_and_compiles_nothing():
+    shown, modules = loaded_by("list")
+    assert "cvxpy-scs" in shown
+    heavy = {"cvxpy", "osqp", "qoco", "cyipopt", "scs", "ecos", "numba", "meshio", "pypardiso"}
+    assert not heavy & {module.split(".")[0] for module in modules}
+    assert not {"scipy.sparse", "scipy.integrate", "scipy.optimize"} & modules
+
+
+def test_the_help_names_every_verb_and_option(monkeypatch, capsys):
+    shown = command(monkeypatch, capsys, "--help").stdout
+    for word in (*cli.VERBS, "--version", "--help"):
+        assert f" {word} " in shown
 
 
 def test_frames_are_exported_with_the_answers_of_the_reference_solver():
