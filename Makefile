@@ -15,7 +15,7 @@ TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipo
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test quick check coverage docs graph perf report thumbnails clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick check coverage docs graph perf kernels report thumbnails clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -81,6 +81,9 @@ perf: setup ## pytest-benchmark on recorded frames, certificates beside; results
 	@mkdir -p $(LOCAL)
 	$(BIN)/python -m pytest tests/perf -o addopts= --benchmark-quiet --benchmark-json=$(LOCAL)/perf.json
 	$(BIN)/strainbench report --results $(LOCAL)/perf.json
+
+kernels: setup ## the solvers' compiled loops against the same in C, in turns; needs cc
+	$(BIN)/python -m tests.kernels
 
 report: setup ## tables and charts from results/local/bench again
 	$(BIN)/strainbench report --results $(BENCH)

@@ -215,7 +215,11 @@ def accelerated(mesh: Blocks, frame: Frame, run: Run, sweeps: int) -> Run:
 def sweep(
     mesh: Blocks, b: FloatArray, x: FloatArray, Y: FloatArray, norms: FloatArray, reverse: bool
 ) -> None:
-    """Steps 1 and 2 for each constraint, forwards or back; `norms` takes the |Y_i|."""
+    """Steps 1 and 2 for each constraint, forwards or back; `norms` takes the |Y_i|.
+
+    1.29 of the same in C (`make kernels`), for a single row: Z goes through memory, as its shape is
+    that of a row or of an element. Products and sums rounded at once gain a twentieth.
+    """
     G, moves, steps = mesh
     Z = np.empty((len(G.axes), 3))
     for number in range(len(b)):

@@ -20,6 +20,8 @@ which are positive definite at any rank and no larger than the free coordinates:
 8 times sooner. Full steps can raise C, as a row also lengthens, to second order, when its ends
 move sideways; dx always descends phi, which is convex, so that halving it is safe.
 
+No loop is compiled here: SciPy's are in C, and the factorisation takes most of the time.
+
 Each step is the least move from where the last one ended, and none goes back towards the target:
 the answer is feasible, not the closest.
 """

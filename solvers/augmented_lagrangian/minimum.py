@@ -170,7 +170,7 @@ def decompose(Z: FloatArray, i: int, axes: tuple[int, ...], local: Local) -> Non
         local.V[i], local.s[i], local.Ut[i] = np.linalg.svd(Z)
 
 
-@compiled
+@compiled(error_model="numpy", contract=True)
 def differentiate(
     i: int, axes: tuple[int, ...], b: float, local: Local, H: FloatArray, A: FloatArray
 ) -> None:
@@ -230,9 +230,13 @@ def diagonal(K: Hessian) -> FloatArray:
     return blocks
 
 
-@compiled
+@compiled(error_model="numpy", contract=True)
 def product(K: Hessian, p: FloatArray, out: FloatArray) -> None:
-    """Fill `out` with the Hessian times p (n, 3)."""
+    """Fill `out` with the Hessian times p (n, 3).
+
+    1.26 of the same in C (`make kernels`; 1.51 with separate rounding and divisions that raise), as
+    H goes through memory: its shape is that of a row or of an element. So has `evaluate` 1.28.
+    """
     (G, pulls, _, M, _), b, rho, local = K
     for k in range(len(p)):
         for c in range(3):
