@@ -203,7 +203,8 @@ def compare(loop: Loop, turns: int) -> Compared:
 
 def table(compared: Sequence[Compared], title: str) -> Table:
     """A row a loop."""
-    columns = ["loop", *(Column(n, right=True) for n in ("ours / C", "quartiles", "apart"))]
+    columns: list[str | Column] = ["loop"]
+    columns += [Column(n, right=True) for n in ("ours / C", "quartiles", "apart")]
     lines = []
     for one in compared:
         low, high = np.quantile(one.ratios, [0.25, 0.75])
