@@ -48,10 +48,10 @@ class Clarabel(Solver):
     Also tried, by `strainbench duel swing --set resolution=20 --frame 12` with plug-ins that change
     one setting each, on a busy machine: steps of 0.995 to the boundary (20 iterations for 18) and
     two refinements for ten are no faster. MKL Pardiso, which newton-ipm has, takes 3.3 times as
-    long as faer, with 22 iterations for 18; with minimum degree as its ordering (iparm[1] = 0) it is
-    1.6 times faster, with 15 iterations; without matching (iparm[12] = 0) it is not. The
-    wheel looks for libmkl_rt.so in MKL_PARDISO_PATH, and PyPI's mkl has libmkl_rt.so.3 alone: links
-    to it and to its neighbours, in a folder of their own, make it run.
+    long as faer, with 22 iterations for 18; minimum degree as its ordering (iparm[1] = 0) makes
+    that 1.6 times faster, with 15 iterations, no matching (iparm[12] = 0) does not. The wheel looks
+    for libmkl_rt.so in MKL_PARDISO_PATH, and PyPI's mkl has libmkl_rt.so.3 alone: links to it and
+    to its neighbours, in a folder of their own, make it run.
     """
 
     name = "clarabel"
