@@ -58,8 +58,8 @@ def not_convex(_: Evidence) -> Finding:
         Verdict.of(admissible and between < least),
         f"An edge and its reverse keep a lower limit of {least:g}; half way between them its "
         f"length is {between:g}.",
-        "`pytest tests/referee -k local`: two local optima of one problem, of which neither is "
-        "called optimal.",
+        "The referee calls no answer under lower limits optimal, at best a local optimum "
+        "(`pytest tests/referee/test_kkt.py -k local`).",
     )
 
 

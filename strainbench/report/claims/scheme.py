@@ -1,4 +1,4 @@
-"""Claims of Tang et al. (2022) about time stepping: section 4, Figs. 4 to 6."""
+"""Claims of Tang et al. (2022) about motion and rest: section 4, Figs. 2 and 4 to 6."""
 
 from __future__ import annotations
 
@@ -27,6 +27,34 @@ MANY = at(
     "--duration 1",
 )
 BLOWN_UP = 1000.0  # mJ; the cloth has some 60 to lose
+
+
+@claim(
+    "T12",
+    "Fig. 2",
+    "Limits decide the drape: shapes are clearly different.",
+    at(
+        "drape",
+        "run drape --solver newton-ipm --set resolution=60 --set "
+        "shape=isotropic,orthotropic,anisotropic --steps 2",
+    ),
+    fairness="Their curves are read off a plot.",
+)
+def drapes(seen: Evidence) -> Finding:
+    """Energies of gravity of the three drapes, so heights of their centres of mass."""
+    names = ("isotropic", "orthotropic", "anisotropic")
+    at_rest = {"solver": "newton-ipm", "resolution": 60}
+    cells = {name: seen.cells("drape", shape=name, **at_rest).tail(1) for name in names}
+    low = {n: 1000 * seen.steps("drape", c, "gravity_energy").iloc[-1] for n, c in cells.items()}
+    apart = [abs(low["orthotropic"] - low[n]) for n in ("isotropic", "anisotropic")]
+    return Finding(
+        Verdict.of(min(apart) > 1, max(apart) > 1),
+        "Energies of gravity of "
+        + ", ".join(f"{energy:.2f} mJ ({name})" for name, energy in low.items())
+        + f": the isotropic drape hangs higher, by {100 * apart[0] / abs(low['orthotropic']):.0f}% "
+        f"of its fall; the other two differ by {100 * apart[1] / abs(low['orthotropic']):.1f}%.",
+        "`strainbench render drape` and `polar drape` show them.",
+    )
 
 
 @claim(
