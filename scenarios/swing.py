@@ -8,6 +8,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
+from strainbench.problem.limits import StretchLimits
 from strainbench.scenario.cloth import ClothScenario
 
 SIDE = 0.5  # [m]
@@ -22,17 +23,29 @@ class Swing(ClothScenario):
     Parameters
     ----------
     diagonals : "alternating" or "uniform".
+    offset : angle by which the sampled directions are turned [degrees].
     """
 
     name = "swing"
     needs = frozenset({"inertia", "gravity", "membrane", "bending"})
 
     diagonals: str = "alternating"
+    offset: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.diagonals not in ("alternating", "uniform"):
             raise ValueError(f"diagonals is {self.diagonals!r}: valid are alternating, uniform")
+        if not np.isfinite(self.offset) or (self.offset and self.directions == "exact"):
+            valid = "an angle, or 0 with exact directions, is valid"
+            raise ValueError(f"offset is {self.offset:g}: {valid}")
+
+    def limits(self) -> StretchLimits:
+        """The same bound in all sampled directions, turned by the offset."""
+        if not self.offset or isinstance(self.directions, str):
+            return super().limits()
+        angles = self.sampled_angles() + np.deg2rad(self.offset)
+        return StretchLimits.sampled(angles, np.full(self.directions, 1 + self.limit))
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class."""

@@ -39,7 +39,6 @@ class IpoptEdges(Ipopt):
     """
 
     name = "ipopt-edges"
-    variants = {}
     takes_exact = True
     takes_lower = False
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from strainbench.bench.mode import window
 from strainbench.fields import plain, restored
 from strainbench.referee.reference import REFERENCE_SOLVER
 from strainbench.scenario.registry import find_scenario, scenarios_of
@@ -118,8 +119,9 @@ class Cell:
 
     Parameters
     ----------
-    mode : "simulate" (closed loop) or "replay" (every solver is fed the same recorded frames)
-    steps : time steps
+    mode : "simulate" (closed loop) or "replay" (every solver is fed the same recorded frames), of
+        some steps alone as "replay:14-30"
+    steps : time steps that are played or fed
     tolerance : aimed at by the solver
     time_limit : [s] for physics and solver together, or None
     threads : in the solver's BLAS, OpenMP, numba and rayon
@@ -152,7 +154,12 @@ class Cell:
         """
         recorder = plugin_source(type(find_solver(REFERENCE_SOLVER)))
         sources = [f for s in (self.scenario.source, recorder) for f in plugin_files(s)]
-        return _digest([self.scenario.identity, self.steps, digest(closure(*sources))])
+        return _digest([self.scenario.identity, self.window[1], digest(closure(*sources))])
+
+    @property
+    def window(self) -> tuple[int, int]:
+        """The first and the last step of the scene that it is about."""
+        return window(self.mode, self.steps)
 
     @property
     def title(self) -> str:

@@ -58,6 +58,8 @@ RUN_COLUMNS = (
     "repeats",
     "load",
     "stolen_seconds",
+    "min_principal_stretch",
+    "jitter",
 )
 """Of `repeats`: `solve_seconds_mean` and `_median` are over the projections' medians."""
 STEP_COLUMNS = (
@@ -100,6 +102,7 @@ STEP_COLUMNS = (
     "seconds_low",
     "seconds_high",
     "seconds_each",
+    "min_principal_stretch",
 )
 """With repeats, `seconds` is their median, low and high their quartiles, each all as measured."""
 

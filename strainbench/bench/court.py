@@ -20,6 +20,7 @@ from typing import Any
 from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running, crashed
 from strainbench.bench.judge import JUDGED, judge, judge_limit, unjudged
+from strainbench.bench.mode import replays
 from strainbench.bench.process import Child, Family, spawned
 from strainbench.bench.rows import Verdict
 from strainbench.files import uninterrupted
@@ -42,7 +43,7 @@ def serve() -> None:
     for line in sys.stdin:
         folder = Path(json.loads(line))
         cell, ending = pickle.loads((folder / CASE).read_bytes())
-        key = cell.recording_key if cell.mode == "replay" else cell.key
+        key = cell.recording_key if replays(cell.mode) else cell.key
         if key != recording:
             recording, kept = key, Kept()
         try:

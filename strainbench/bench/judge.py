@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ import numpy as np
 from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
 from strainbench.bench.journal import Events, only, read_events, read_frames, read_journal
+from strainbench.bench.mode import replays
 from strainbench.bench.rows import GAP, VIOLATION, Verdict, run_row, step_rows, times
 from strainbench.referee.certificate import OUTCOMES, Certificate, certify
+from strainbench.referee.motion import jitter
 from strainbench.referee.reference import Kept, ReferenceSolver
-from strainbench.scenario.scenario import Scenario
 
 JUDGED = "judged"  # a file in a cell's folder, with a byte for each certificate
 JUDGE_LIMIT = 300.0  # [s] for a projection of up to JUDGE_VARIABLES, beyond that in proportion
@@ -51,9 +53,10 @@ def judge(cell: Cell, folder: Path, ending: str, kept: Kept | None = None) -> Ve
     counted, steps = certificates[:in_time], len(only(events, "step"))
     outcome, reason = _outcome(cell, events, counted, steps, ending or damage)
     whole = steps == cell.steps  # of one that was cut short nothing is to be expected
-    missed = _missed(cell.scenario.scenario(), folder, len(projections), steps) if whole else []
+    missed = _missed(cell, folder, len(projections)) if whole else []
     row = run_row(cell, events, counted, ending)
     row |= {"outcome": outcome, "reason": "; ".join(filter(None, [reason, *missed]))}
+    row["jitter"] = _jitter(cell, folder, projections)
     row["judge_seconds"] = time.perf_counter() - begin
     return row, rows
 
@@ -84,19 +87,30 @@ def _certificates(cell: Cell, folder: Path, count: int, kept: Kept | None) -> li
     return certificates
 
 
-def _missed(scene: Scenario, folder: Path, count: int, steps: int) -> list[str]:
-    """What a scene is for and `steps` steps of it, with `count` frames, never came to."""
+def _missed(cell: Cell, folder: Path, count: int) -> list[str]:
+    """What a scene is for and the steps of a cell, with `count` frames, never came to."""
     if not count:
         return []
+    scene, last = cell.scenario.scenario(), cell.window[1]
     problem, words = scene.problem(), []
     frames = [problem.with_target(target) for target, _ in read_frames(folder, count)]
     if not any(np.any(frame.violations(frame.target)) for frame in frames):
         words.append("no candidate was beyond the limits: nothing had to be projected")
     if not any(scene.has_begun(frame) for frame in frames):
         first = scene.first_step
-        later = f"; it begins at about step {first:g}" if steps < first < np.inf else ""
-        words.append(f"{scene.about} never happened in these {steps} steps{later}")
+        later = f"; it begins at about step {first:g}" if last < first < np.inf else ""
+        words.append(f"{scene.about} never happened in these {cell.steps} steps{later}")
     return words
+
+
+def _jitter(cell: Cell, folder: Path, projections: Events) -> object:
+    """Of the positions that the steps of a closed loop end with; nothing for those of a replay."""
+    if replays(cell.mode):
+        return ""
+    each = zip(projections, read_frames(folder, len(projections)), strict=True)
+    ends = (list(of)[-1][1][1] for _, of in groupby(each, key=lambda p: p[0]["step"]))
+    found = jitter(ends)
+    return "" if np.isnan(found) else found
 
 
 def _badness(certificate: Certificate) -> float:

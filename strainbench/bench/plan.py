@@ -14,6 +14,7 @@ from typing import TypeVar
 import psutil
 
 from strainbench.bench.cell import Cell, PluginRef
+from strainbench.bench.mode import checked, steps_of
 from strainbench.bench.settings import Choices, blaming, combinations, is_file, parse_settings
 from strainbench.fields import default_of
 from strainbench.options import MOST, shown
@@ -25,7 +26,6 @@ from strainbench.solver.registry import find_solver, list_solvers, solvers_of
 from strainbench.solver.solver import Solver, warm_twin
 
 Plugin = TypeVar("Plugin", Solver, Scenario)
-MODES = ("simulate", "replay")
 STARTS = ("cold", "warm")
 BYTES_A_CELL = 472
 """Of a square of two triangles, at least: its vertex, its indices, its rows of the constraints."""
@@ -175,6 +175,7 @@ def plan(
 
     Parameters
     ----------
+    mode : see `strainbench.bench.mode`
     starts : of STARTS; solvers that cannot start warm do so "cold" alone, see `never_warm`.
 
     Raises
@@ -182,7 +183,9 @@ def plan(
     ValueError
         One line that names the wrong word and what is valid.
     """
-    _check_words(mode, starts)
+    mode = checked(mode)
+    steps = steps_of(mode, steps, duration)
+    _check_starts(starts)
     for name, count in (("--steps", steps), ("--threads", threads), ("--repeats", repeats)):
         _check_numbers({name: [count]}, "a whole number")
     times = {"--time-limit": [time_limit], "--duration": [duration]}
@@ -204,9 +207,7 @@ def plan(
     return list({cell.key: cell for cell in cells}.values())
 
 
-def _check_words(mode: str, starts: Sequence[str]) -> None:
-    if mode not in MODES:
-        raise ValueError(f"--mode {shown(mode)}: valid are {', '.join(MODES)}")
+def _check_starts(starts: Sequence[str]) -> None:
     if not starts or not set(starts) <= set(STARTS):
         raise ValueError(f"--start {shown(','.join(starts))}: valid are cold, warm and cold,warm")
 

@@ -13,7 +13,8 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
-from itertools import groupby
+from itertools import dropwhile, groupby
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -83,10 +84,11 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
         write_down(journal, projection)
         return stage.accept(projection)
 
-    fed = partial(replay, recording) if recording else None
-    for report in stage.steps(cell.steps, project, fed):
+    first, last = cell.window
+    fed = partial(replay, recording, first) if recording else None
+    for report in stage.steps(cell.steps, project, fed, first):
         journal.write("step", step=stage.step, **vars(report))
-        if stage.step < cell.steps:
+        if stage.step < last:
             timer.check()
 
 
@@ -164,11 +166,13 @@ def wait_for_go(folder: Path, journal: Journal) -> None:
     journal.write("started")
 
 
-def replay(recording: Path, project: Project) -> Iterator[StepReport]:
-    """Project the candidates of a recorded run, step by step, whatever became of them."""
+def replay(recording: Path, first: int, project: Project) -> Iterator[StepReport]:
+    """Project the candidates of a recorded run, from step `first` on, whatever became of them."""
     events = only(read_events(recording), "projection")
     targets = read_targets(recording, len(events))
-    for _, projections in groupby(zip(events, targets, strict=True), key=lambda p: p[0]["step"]):
+    fed = ((e["step"], target) for e, target in zip(events, targets, strict=True))
+    later = dropwhile(lambda p: p[0] < first, fed)
+    for _, projections in groupby(later, key=itemgetter(0)):
         for _, target in projections:
             project(target)
         yield StepReport()

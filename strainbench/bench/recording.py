@@ -10,6 +10,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell, PluginRef
+from strainbench.bench.mode import SIMULATE
 from strainbench.files import locked, open_folder
 from strainbench.problem.problem import Problem
 from strainbench.referee.reference import REFERENCE_SOLVER
@@ -20,7 +21,8 @@ from strainbench.solver.registry import find_solver
 def recorder(cell: Cell) -> Cell:
     """The same scene with the reference solver, which records what others are fed."""
     reference = PluginRef.of(find_solver(REFERENCE_SOLVER))
-    played = replace(cell, solver=reference, mode="simulate", tolerance=1e-6)
+    last = cell.window[1]
+    played = replace(cell, solver=reference, mode=SIMULATE, steps=last, tolerance=1e-6)
     return replace(played, time_limit=None, repeats=1)
 
 

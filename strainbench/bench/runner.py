@@ -22,6 +22,7 @@ from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running
 from strainbench.bench.journal import keep_targets
 from strainbench.bench.machine import describe_machine, fixed_threads
+from strainbench.bench.mode import replays
 from strainbench.bench.preload import STARTS, Nurseries
 from strainbench.bench.process import Family, family
 from strainbench.bench.recording import recorder
@@ -176,8 +177,8 @@ class Runner:
             time.sleep(POLL_SECONDS)
 
     def _start(self, ours: Family, cell: Cell) -> Running:
-        recording = self._recording(cell) if cell.mode == "replay" else None
-        folder = self.scratch / f"{cell.key}-{cell.mode}"
+        recording = self._recording(cell) if replays(cell.mode) else None
+        folder = self.scratch / f"{cell.key}-{cell.mode.replace(':', '-')}"
         with fixed_threads(cell.threads):
             limit, starter = self.settings.memory_limit_mb, self._nurseries.starter(cell)
             return Running.start(ours, cell, folder, recording, limit, starter=starter)
@@ -187,7 +188,7 @@ class Runner:
         reason = ""
         if cell.solver.unavailable:
             reason = f"{Ending.UNAVAILABLE}: {cell.solver.unavailable}"
-        elif cell.mode == "replay" and not self._recording(cell).exists():
+        elif replays(cell.mode) and not self._recording(cell).exists():
             reason = f"{Ending.UNRECORDED} with {REFERENCE_SOLVER}"
         if reason:
             row = identity(cell) | {"steps_done": 0, "outcome": "no answer", "reason": reason}
@@ -199,7 +200,7 @@ class Runner:
 
     def _missing_recordings(self, cells: Sequence[Cell]) -> list[Cell]:
         """The cells that record what replay cells will be fed, where that is not there yet."""
-        fed = {cell.recording_key: cell for cell in cells if cell.mode == "replay"}
+        fed = {cell.recording_key: cell for cell in cells if replays(cell.mode)}
         there = {key for key, cell in fed.items() if self._recording(cell).exists()}
         for key in there:
             keep_targets(self._recording(fed[key]))  # of an earlier version, with answers

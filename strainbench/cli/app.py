@@ -17,6 +17,7 @@ import typer
 
 from strainbench import __version__
 from strainbench.cli.advice import recommend
+from strainbench.cli.claims import audit_claims
 from strainbench.cli.display import console, errors, say
 from strainbench.cli.instances import export_frames, make_test_set
 from strainbench.cli.interrupt import (
@@ -92,6 +93,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "map": draw_map,
     "render": render_scene,
     "polar": draw_polar,
+    "claims": audit_claims,
 }
 for _name, _verb in VERBS.items():
     app.command(_name)(_verb)

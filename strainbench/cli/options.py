@@ -115,6 +115,10 @@ SolversValues = Annotated[
 
 # how to run
 Mode = Annotated[str, typer.Option("--mode", help="simulate (closed loop) or replay (same frames)")]
+Frames = Annotated[
+    str | None,
+    typer.Option("--frames", metavar="A-B", help="with --mode replay, the steps that are fed"),
+]
 CellSeconds = Annotated[
     float | None, _seconds("--time-limit", "a cell, physics and solver; none by default")
 ]
@@ -182,6 +186,11 @@ Folders = Annotated[
     ),
 ]
 Measure = Annotated[bool, typer.Option("--measure", help="measure first what is not there yet")]
+
+AuditFolder = Annotated[Path, _folder("folder with the folders of results")]
+MeasureClaims = Annotated[
+    bool, typer.Option("--measure", help="first run what has no rows there yet; hours, resumes")
+]
 
 FailOn = Annotated[
     list[str] | None,

@@ -17,6 +17,7 @@ from strainbench.cli.options import (
     Debug,
     Duration,
     Folder,
+    Frames,
     Jobs,
     ManyValues,
     Memory,
@@ -47,6 +48,7 @@ def run_cells(
     steps: StepsOrAll = None,
     duration: Duration = None,
     mode: Mode = "simulate",
+    frames: Frames = None,
     start: Start = "cold",
     tolerance: Tolerances = "1e-6",
     time_limit: CellSeconds = None,
@@ -62,11 +64,13 @@ def run_cells(
 ) -> None:
     """Run every combination of scenarios, settings and solvers; resumes by itself."""
     from strainbench.bench.machine import memory_share
+    from strainbench.bench.mode import with_frames
     from strainbench.bench.plan import never_warm, plan
     from strainbench.bench.runner import Settings
 
     _check_words(scheduler, steps, duration, debug)
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
+    mode = with_frames(mode, frames) if frames else mode
     how = (mode, steps, tolerances, time_limit, duration, starts, threads, repeats)
     cells = plan(scenarios, solvers, set_ or [], *how)
     if "cold" not in starts and (cold := never_warm(solvers)):

@@ -50,6 +50,7 @@ class Certificate:
         lower bound; with exact limits largest max(0, ||F D||_2 - 1) times the tightest axis's
         bound.
     max_principal_stretch : largest singular value of any F, the true stretch.
+    min_principal_stretch : smallest one, how far an element is compressed.
     objective : f(x) = 1/2 ||x - target||_M^2.
     lower_bound : D(Y) <= f(x*), or 0 where the reference failed.
     relative_gap : (f(x) + sum |Y_i| v_i - D) / max(D, floor); for a feasible point the usual
@@ -77,6 +78,7 @@ class Certificate:
     active_constraints: int
     kkt_residual: float = float("nan")
     best_known: float = float("nan")
+    min_principal_stretch: float = float("nan")
 
 
 def certify(
@@ -142,6 +144,7 @@ def _certify_optimum(
     far they are from there is known, and the bounds are those of the other vertices.
     """
     v = _violations(problem, x)
+    least, largest = _principal_stretches(problem, x)
     worst = float(v.max())
     inside = x.copy()
     inside[problem.isolated] = problem.target[problem.isolated]
@@ -160,7 +163,8 @@ def _certify_optimum(
         outcome=outcome,
         reason=reason,
         max_violation=worst,
-        max_principal_stretch=_largest_singular_value(problem, x),
+        max_principal_stretch=largest,
+        min_principal_stretch=least,
         objective=objective,
         lower_bound=ref.lower_bound,
         relative_gap=relative_gap,
@@ -181,6 +185,7 @@ def _certify_local(
 ) -> Certificate:
     """Judge positions under lower bounds: at best a local optimum."""
     worst = float(_violations(problem, x).max())
+    least, largest = _principal_stretches(problem, x)
     objective = problem.objective(x)
     residual = kkt_residual(problem, x) if np.isfinite(worst + objective) else float("inf")
     for y in (x, ref.positions):
@@ -200,7 +205,8 @@ def _certify_local(
         outcome=outcome,
         reason=reason,
         max_violation=worst,
-        max_principal_stretch=_largest_singular_value(problem, x),
+        max_principal_stretch=largest,
+        min_principal_stretch=least,
         objective=objective,
         lower_bound=nan,
         relative_gap=nan,
@@ -237,13 +243,15 @@ def _violations(problem: Problem, x: FloatArray) -> FloatArray:
     return np.where(np.isnan(v), np.inf, v)
 
 
-def _largest_singular_value(problem: Problem, x: FloatArray) -> float:
+def _principal_stretches(problem: Problem, x: FloatArray) -> tuple[float, float]:
+    """The smallest and the largest singular value of any F."""
     size = float(np.abs(x).max()) or 1.0  # or the squares of a diverged answer overflow
     F = problem.deformation_gradients(x / size)
     scale = float(np.abs(F).max()) or 1.0
     F = F / scale
-    largest = float(np.linalg.eigvalsh(np.swapaxes(F, 1, 2) @ F)[:, -1].max())
-    return size * scale * float(np.sqrt(max(0.0, largest)))
+    squares = np.linalg.eigvalsh(np.swapaxes(F, 1, 2) @ F)
+    least, largest = (float(np.sqrt(max(0.0, s))) for s in (squares.min(), squares.max()))
+    return size * scale * least, size * scale * largest
 
 
 def _outcome(

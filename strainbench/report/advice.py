@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from strainbench.bench.cell import PluginRef
+from strainbench.bench.mode import replays
 from strainbench.bench.settings import Choices
 from strainbench.document import Column, Document, Items, Part, Prose, Strong, Table
 from strainbench.report.candidate import Candidate, Records
@@ -96,7 +97,7 @@ class Advice:
             lines.append(f"Measured beside other work: {', '.join(busy)}.")
         for how, names in self._older().items():
             lines.append(f"Measured {how}: {', '.join(names)}.")
-        if self.question.per == "step" and any(c.row["mode"] == "replay" for c in self.candidates):
+        if self.question.per == "step" and any(replays(c.row["mode"]) for c in self.candidates):
             lines.append("Replayed frames have no physics: their steps are projections alone.")
         if self.missing and (self.candidates or self.left_out):
             lines.append(f"Not measured: {', '.join(self.missing.solvers)}.")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from strainbench.arrays import FloatArray
 from strainbench.document import Column, Prose, Table
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits, settings
 from strainbench.report.steps import newest_steps
@@ -24,8 +25,11 @@ IN_NAMES = {*SPANNED, MESH_FILE, CURVE_FILE, "step", "integrator"}
 """Settings that panels and curves are called by anyway."""
 EXPLANATION = """\
 After each step. Energy above that of the first steps is a sign of instability; a run that comes to
-rest has a small range in its last quarter."""
+rest has a small range in its last quarter. Rises: the sum of all of them. Fluctuation: root mean
+square of the second difference. Turns: how often the energy begins to rise, or to fall."""
 NUMBERS = {"time": "s", "first": "mJ", "highest": "", "last": "", "range in the last quarter": ""}
+UNSTEADY = {"rises": "", "fluctuation": ""}
+"""Further such columns."""
 """Columns with their units."""
 ENDED = "ended after"  # in the names of runs without an answer to the end
 
@@ -98,6 +102,20 @@ def energy_table(folder: Path, runs: pd.DataFrame) -> Table:
         energy, first = 1000 * run["energy"].to_numpy(), run.iloc[0]
         late = energy[-max(2, len(energy) // 4) :]
         values = (energy[0], energy.max(), energy[-1], late.max() - late.min())
-        lines.append([first["panel"], first["curve"], len(run), run["time"].max(), *values])
-    numbers = [Column(name, unit, ".4g") for name, unit in NUMBERS.items()]
-    return Table("Total energy", ["scene", "run", "steps", *numbers], lines, Prose(EXPLANATION))
+        about = [first["panel"], first["curve"], len(run), run["time"].max()]
+        lines.append([*about, *values, *unsteadiness(energy)])
+    numbers = [Column(name, unit, ".4g") for name, unit in (NUMBERS | UNSTEADY).items()]
+    header: list[str | Column] = ["scene", "run", "steps", *numbers, "turns"]
+    return Table("Total energy", header, lines, Prose(EXPLANATION))
+
+
+def unsteadiness(energy: FloatArray) -> tuple[float, float, int]:
+    """The sum of all rises, the root mean square of second differences, the number of turns.
+
+    >>> unsteadiness(np.array([3.0, 1.0, 2.0, 0.0]))[::2]
+    (1.0, 2)
+    """
+    change = np.diff(energy)
+    rough = np.sqrt(np.mean(np.diff(change) ** 2)) if len(change) > 1 else 0.0
+    signs = np.sign(change[change != 0])
+    return float(change.clip(min=0).sum()), float(rough), int(np.sum(signs[1:] != signs[:-1]))

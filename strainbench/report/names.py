@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from strainbench import escape
+from strainbench.bench.mode import replays, window
 
 SPANNED = ("resolution", "limit")
 """Settings that have rows and columns of their own within a table."""
@@ -61,6 +62,13 @@ def describe(
         for key, value in settings(text).items()
         if key not in without and value != ""
     )
+
+
+def played(row: pd.Series) -> str:
+    """Which steps of a scene a cell is about."""
+    first, last = window(row["mode"], int(row["steps_asked"]))
+    what = "replayed frames" if replays(row["mode"]) else "simulated steps"
+    return f"{what} {first} to {last}"
 
 
 def percent(limit: float) -> str:

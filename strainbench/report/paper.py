@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from strainbench.bench.mode import replays
 from strainbench.document import Between, Column, Prose, Span, Strong, Table
 from strainbench.document.latex import PAGE, latex, width
 from strainbench.report.lines import accuracy_of, milliseconds, ranked, time_of
@@ -195,7 +196,7 @@ class Sheet:
         first = self.runs.iloc[0]
         what = ", ".join(quantity.words for quantity in self.chosen)
         count, threads = int(first["steps_asked"]), int(first["threads"])
-        replayed = "replayed " if first["mode"] == "replay" else ""
+        replayed = "replayed " if replays(first["mode"]) else ""
         about = [
             f"{first['scenario']}",
             f"{self.limit} limit" if self.limit else "",
@@ -235,7 +236,7 @@ def failure(row: pd.Series) -> str:
 
 def _step(row: pd.Series) -> str:
     """What a cell's steps are called."""
-    return "frame" if row["mode"] == "replay" else "step"
+    return "frame" if replays(row["mode"]) else "step"
 
 
 def _few(count: int) -> str:

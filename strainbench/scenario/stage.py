@@ -178,6 +178,7 @@ class Stage:
         number: int | None = None,
         project: Project | None = None,
         play: Play | None = None,
+        first: int = 1,
     ) -> Iterator[StepReport]:
         """The scene's reports on its steps, in plain numbers.
 
@@ -186,12 +187,13 @@ class Stage:
         number : of steps; None is all that the scene has
         project : limits a candidate, by way of `solve` and `accept`; what it raises passes as it is
         play : in place of the scene's own
+        first : the number of its first step
         """
         gate = _Gate(project or self.project)
         with blamed(Who.SCENE):
             playing = iter((play or self.scenario.play)(gate))
         over: Any = object()
-        for self.step in islice(count(1), number):
+        for self.step in islice(count(first), number):
             with blamed(Who.SCENE, gate):
                 report = next(playing, over)
             if report is not over:

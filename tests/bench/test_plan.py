@@ -9,6 +9,7 @@ import pytest
 
 from strainbench.bench.cell import Cell, PluginRef
 from strainbench.bench.plan import never_warm, plan
+from strainbench.bench.recording import recorder
 from strainbench.bench.settings import parse_settings, parse_value, split_values
 from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.scenario import SceneWarning
@@ -267,6 +268,14 @@ def test_a_solver_from_a_file_runs_beside_ours(mine):
         ({"settings": ["norm=max"]}, r"swing: norm is 'max'.*unweighted, mass"),
         ({"settings": ["diagonals=both"]}, r"swing: diagonals is 'both'.*alternating, uniform"),
         ({"mode": "relive"}, r"--mode relive: .*simulate, replay"),
+        ({"mode": "simulate:2-3"}, r"--mode simulate:2-3: .*simulate, replay"),
+        ({"mode": "replay:3-2"}, r"--frames 3-2: .*14-30"),
+        ({"mode": "replay:"}, r"--frames '': .*14-30"),
+        ({"mode": "replay:0-2"}, r"--frames 0-2: .*14-30"),
+        ({"mode": "replay:2-4", "steps": 9}, r"--frames 2-4 and --steps 9: one of them"),
+        ({"mode": "replay:2-4", "steps": None, "duration": 1.0}, r"--frames 2-4 and --duration 1"),
+        ({"settings": ["offset=nan"]}, r"swing: offset is nan"),
+        ({"settings": ["offset=5", "directions=exact"]}, r"swing: offset is 5.*exact"),
         ({"steps": 0}, r"--steps 0"),
         ({"duration": 0.0}, r"--duration 0"),
         ({"duration": float("inf")}, r"--duration inf"),
@@ -356,6 +365,18 @@ def test_the_recording_does_not_depend_on_the_solver_or_its_tolerance():
     assert replace(one, steps=9).recording_key != one.recording_key
     (other,) = cells(settings=["resolution=3"])
     assert other.recording_key != one.recording_key
+
+
+def test_some_frames_of_a_recording_are_a_cell_of_their_own():
+    (all_,), (some,) = (
+        cells(mode=mode, steps=None, duration=None) for mode in ("replay", "replay:2-4")
+    )
+    (one,) = cells(mode="replay:4", steps=None)
+    assert (some.mode, some.steps, some.window) == ("replay:2-4", 3, (2, 4))
+    assert (one.mode, one.window) == ("replay:4-4", (4, 4))
+    assert recorder(some).steps == 4
+    assert some.key != all_.key
+    assert some.recording_key == one.recording_key != all_.recording_key
 
 
 def test_the_title_tells_what_runs():

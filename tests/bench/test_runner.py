@@ -199,6 +199,18 @@ def test_replay_feeds_every_solver_the_same_candidates(tmp_path):
     assert not any(name == "frames.bin" or name.endswith(".npz") for name in kept)
 
 
+def test_some_frames_are_those_of_the_whole_replay(tmp_path):
+    for mode, steps in (("replay", 3), ("replay:2-3", None)):
+        run(tmp_path, ["none"], mode=mode, steps=steps, time_limit=None)
+    steps = read_rows(tmp_path / STEPS, STEP_COLUMNS)
+    whole, part = (
+        [(s["step"], s["objective"], s["distance"]) for s in steps if s["cell"] == key]
+        for key in dict.fromkeys(s["cell"] for s in steps)
+    )
+    assert [step for step, *_ in part] == ["2", "3"]
+    assert part == whole[1:]
+
+
 def test_an_interrupt_keeps_what_is_finished(tmp_path):
     class Interrupt(Observer):
         def ended(self, cell, row):

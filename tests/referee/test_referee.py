@@ -211,12 +211,13 @@ def test_nothing_is_free_to_move(rng):
 
 
 @pytest.mark.parametrize("seed", FEW)
-def test_the_principal_stretch_of_an_affine_map(seed):
+def test_the_principal_stretches_of_an_affine_map(seed):
     rng = np.random.default_rng(seed)
     problem, _ = random_placed_problem(rng, pins=0)
     A = rng.normal(size=(3, 2))
     certificate = certify(problem, problem.rest @ A.T + rng.normal(size=3))
     assert certificate.max_principal_stretch == pytest.approx(np.linalg.norm(A, 2), rel=1e-8)
+    assert certificate.min_principal_stretch == pytest.approx(np.linalg.norm(A, -2), rel=1e-6)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

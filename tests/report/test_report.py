@@ -187,7 +187,8 @@ def test_total_energy_is_drawn_against_time(folder):
     assert table["curve"].str.startswith("IE").tolist() == 3 * [True] + 3 * [False]
     assert folder / "energy.png" in write_report(folder)
     rows = (folder / "energy.md").read_text().splitlines()[-2:]
-    assert all(r.endswith("| 3 | 0.3 | 1 | 1 | -1 | 1 |") for r in rows)  # [mJ]; 0 to -1 at the end
+    assert all("| 3 | 0.3 | 1 | 1 | -1 | 1 | 0 |" in r for r in rows)  # [mJ]; 0 to -1 at the end
+    assert all(r.endswith("| 0 |") for r in rows)  # no turns
 
 
 def test_a_scene_without_physics_has_no_energy_and_contact_counts(folder):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
+from strainbench.bench.mode import replays
 from strainbench.document import Column, Prose, Table
 from strainbench.report.charts.axes import Axis
 from strainbench.report.charts.canvas import about
@@ -86,7 +87,7 @@ def cases(runs: pd.DataFrame, steps: pd.DataFrame) -> Iterator[Cases]:
         kept, absent = _on_all_cells(rows)
         if kept["solver"].nunique() < 2:
             continue
-        replayed = mode == "replay"
+        replayed = replays(str(mode))
         timed = _by_projection(kept, steps) if replayed else _by_cell(kept)
         table = timed.pivot_table(
             index=["where", "step", "projection"], columns="solver", values="seconds", aggfunc="min"
@@ -95,7 +96,8 @@ def cases(runs: pd.DataFrame, steps: pd.DataFrame) -> Iterator[Cases]:
         limits = kept.groupby("where")["time_limit"].max()
         limits = pd.Series(limits.reindex(table.index.get_level_values("where")).to_numpy())
         if len(table):
-            words = ["replayed" if replayed else "simulated"]
+            frames = str(mode).partition(":")[2]
+            words = ["replayed" if replayed else "simulated", *[f"frames {frames}"] * bool(frames)]
             words += [f"{threads:.0f} threads"] * several
             unit = "projection" if replayed else "cell"
             yield Cases(table, limits.set_axis(table.index), unit, ", ".join(words), absent)

@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from strainbench.bench.mode import replays
 from strainbench.report.charts.axes import Axis, decades, length_tick, power_tick, time_axis
 from strainbench.report.charts.bands import QUESTION, name_band, question, unknown_band
 from strainbench.report.charts.canvas import SOFT, Plane, about, raw
@@ -17,7 +18,7 @@ from strainbench.report.charts.rail import draw_rail, rail_height, why_failed
 from strainbench.report.charts.target import Target
 from strainbench.report.charts.text import Box, Name, Placed, place
 from strainbench.report.measures import COUNT, OPTIMAL, duration, length
-from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits_of
+from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits_of, played
 from strainbench.report.numbers import power
 from strainbench.report.table import UNCONSTRAINED
 
@@ -73,7 +74,9 @@ def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance"
     accuracy = ACCURACIES[against]
     methods = runs[runs["solver"] != UNCONSTRAINED]
     methods = methods.assign(accuracy=accuracy.of(methods), label=labels(methods))
-    replays_first = methods.sort_values("mode", key=lambda mode: mode != "replay", kind="stable")
+    replays_first = methods.sort_values(
+        "mode", key=lambda modes: ~modes.map(replays), kind="stable"
+    )
     charts: list[Chart] = []
     stem = "speed-accuracy" if against == "distance" else f"speed-{against}"
     figures = replays_first.groupby(FIGURE, sort=False, dropna=False)
@@ -180,8 +183,7 @@ class Panel:
         run, runs = self.runs.iloc[0], self.runs
         precision = digits_of(runs["tolerance"])
         tolerances = ", ".join(f"{t:.{precision}g}" for t in sorted(set(runs["tolerance"]))[::-1])
-        how = {"replay": "Replayed frames", "simulate": "Simulated"}.get(run["mode"], run["mode"])
-        said = f"{how}, {run['steps_asked']:.0f} steps, tolerance {tolerances}"
+        said = f"{played(run).capitalize()}, tolerance {tolerances}"
         more = [run["setting"]] if run["setting"] else []
         lost = runs[runs["ending"].isin(COUNT)].drop(self.counted.index)["solver"].unique()
         if len(lost):

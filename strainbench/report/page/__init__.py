@@ -16,7 +16,7 @@ from strainbench.escape import plain
 from strainbench.progress import Track, untracked
 from strainbench.report.identity import look
 from strainbench.report.measures import OPTIMAL, measured, numbers
-from strainbench.report.names import percent
+from strainbench.report.names import percent, played
 from strainbench.report.page import data
 from strainbench.report.page.headline import headline
 from strainbench.report.page.races import CASE, with_cases
@@ -123,7 +123,7 @@ def _meta(runs: pd.DataFrame) -> str:
     """What all cells share, in a line."""
     parts = [
         *_few(runs["scene"], "{} scenes"),
-        *_few([_steps(row) for _, row in runs.iterrows()], ""),
+        *_few([played(row) for _, row in runs.iterrows()], ""),
         *_few([f"limit {percent(v)}" if v == v else "" for v in runs["limit"]], "{} limits"),
         *_few([f"directions {v}" if v else "" for v in runs["directions"].astype(str)], ""),
         *_few(runs["aim"], "{} tolerances"),
@@ -132,11 +132,6 @@ def _meta(runs: pd.DataFrame) -> str:
         str(max(runs["finished_at"].fillna("").astype(str)))[:10],
     ]
     return " · ".join(filter(None, parts))
-
-
-def _steps(row: pd.Series) -> str:
-    said = {"replay": "replayed frames 1 to", "simulate": "simulated steps 1 to"}
-    return f"{said.get(row['mode'], row['mode'])} {row['steps_asked']:.0f}"
 
 
 def _few(values: Iterable[str], form: str) -> list[str]:

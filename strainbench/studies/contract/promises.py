@@ -66,7 +66,7 @@ UNSCALED = (
     "qoco-default",
 )
 """Out of the box: an objective known to 1e-8 of its size leaves positions uncertain by 1e-4."""
-EDGES, NOTHING = "ipopt-edges", "none"
+EDGES, NOTHING = ("ipopt-edges", "ipopt-edges-default", "ipopt-edges-default-lbfgs"), "none"
 MULTIPLIERS = (*TO_OPTIMALITY, "clarabel-paper")
 
 
@@ -79,7 +79,7 @@ def promise_of(solver: Solver) -> Promise:
     aims: dict[str, Aim] = {
         **dict.fromkeys(TO_OPTIMALITY, "projection"),
         **dict.fromkeys(FIXED_COUNT, "fixed"),
-        EDGES: "edges",
+        **dict.fromkeys(EDGES, "edges"),
         NOTHING: "nothing",
     }
     return replace(promise, aim=aims.get(label, "limits"))
