@@ -69,7 +69,7 @@ from functools import partial
 import numpy as np
 
 from solvers.newton_ipm.infeasible import infeasible_multipliers
-from solvers.newton_ipm.iterate import STRICTER, Iterate, State
+from solvers.newton_ipm.iterate import DEARER, Iterate, State
 from solvers.newton_ipm.mesh import ROUNDING
 from strainbench import Clock, Problem, Solution, Solver, section
 from strainbench.arrays import FloatArray
@@ -229,17 +229,17 @@ multipliers have no bound, and the referee's may price a violation higher than t
 
 
 def worth(problem: Problem, solution: Solution) -> float:
-    """The error as the referee has it, with violations STRICTER, as in `Iterate.measure`.
+    """The error as the referee has it, with violations DEARER, as in `Iterate.measure`.
 
     Being below the optimum does not set off violations here: other multipliers price them higher.
     """
     assert solution.multipliers is not None
     x, violations = solution.positions, problem.violations(solution.positions)
     lower_bound, norms = dual_bound(problem, solution.multipliers)
-    price = STRICTER * float(norms @ np.maximum(violations - 2 * ROUNDING, 0.0))
+    price = DEARER * float(norms @ np.maximum(violations - 2 * ROUNDING, 0.0))
     scale = max(lower_bound, problem.objective_floor)
     gap = (abs(problem.objective(x) - lower_bound) + price) / scale
-    return max(STRICTER * float(violations.max()), gap)
+    return max(DEARER * float(violations.max()), gap)
 
 
 def roughly(
