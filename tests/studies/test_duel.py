@@ -77,6 +77,7 @@ def test_the_referee_judges_the_answers(recording):
     assert exact.worst_violation < 1e-6 > exact.worst_gap
     excess = recording.frame(6).violations(recording.targets[5]).max()
     assert none.worst_violation == pytest.approx(excess)
+    assert exact.worst_distance < 1e-6 < none.worst_distance
     assert exact.unsolved == []
 
 

@@ -94,6 +94,11 @@ class Racer:
         return float(np.max([c.relative_gap for c in self.certificates] or [np.nan]))
 
     @property
+    def worst_distance(self) -> float:
+        """[m] of a vertex from the optimum, over the frames; NaN where an answer is not usable."""
+        return float(np.max([c.distance for c in self.certificates] or [np.nan]))
+
+    @property
     def unsolved(self) -> list[str]:
         """What it says of frames that it does not call solved."""
         return sorted({str(a.status) for a in self.answers.values()} - {"solved"})

@@ -18,7 +18,7 @@ EXPLANATION = (
     "One process, one thread; the methods take turns on each frame. Seconds are the median of all "
     "projections, with their quartiles; set-up is apart. Times faster is the first method's median "
     "over that of the row; CPU is the process's own time, which another's load changes less. "
-    "Violation and gap are the referee's, the worst over the frames."
+    "Violation, gap and distance to the optimum are the referee's, the worst over the frames."
 )
 VERSIONS = (
     "Each version has a process of its own, and they take turns. Times faster is "
@@ -28,7 +28,7 @@ VERSIONS = (
 CSV_HEADER = (
     *("method", "setup_seconds", "seconds", "first_quartile", "third_quartile", "times_faster"),
     *("iterations", "max_violation", "relative_gap", "per_factorisation", "per_implicit_euler"),
-    *("projections", "says", "machine", "command", "cpu_seconds"),
+    *("projections", "says", "machine", "command", "cpu_seconds", "distance_mm"),
 )
 HEADER = {
     "method": Column("method", whole=True),
@@ -39,6 +39,7 @@ HEADER = {
     "iterations": Column("iterations", form="g"),
     "max_violation": Column("violation", form=power),
     "relative_gap": Column("gap", form=power),
+    "distance_mm": Column("distance", "mm", ".1g"),
     "per_factorisation": Column("/ factor. + solve", form=".2f"),
     "per_implicit_euler": Column("/ implicit Euler", form=".2f"),
     "cpu_seconds": Column("CPU", "s", ".3g"),
@@ -99,6 +100,7 @@ class Outcome:
                 next(iter(self.machines)),
                 self.command,
                 entry.median_cpu,
+                1e3 * entry.worst_distance,
             )
             yield dict(zip(CSV_HEADER, values, strict=True))
 
