@@ -24,7 +24,7 @@ from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.plan import plan
 from strainbench.bench.records import RUNS, STEPS, append_rows
 from strainbench.document import writers
-from strainbench.studies.duel.measure import Racer
+from strainbench.studies.duel.racer import Racer
 from strainbench.studies.duel.report import Outcome
 from strainbench.studies.ledger.measure import Row
 from strainbench.studies.ledger.report import as_markdown as ledger_markdown

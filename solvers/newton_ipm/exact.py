@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from solvers.newton_ipm.matrix import Slots, spread_blocks
+from solvers.newton_ipm.matrix import Slots, spread_products
 from solvers.newton_ipm.mesh import ROUNDING, Change, Sums, add_sums
 from solvers.newton_ipm.symmetric import (
     after,
@@ -41,7 +41,7 @@ ROOT_HALF = 0.5**0.5
 
 
 class Point(NamedTuple):
-    """Where all constraints are: y (e, 2, 3), s, l, r (e, 3), and the scaling R, R^-1, d."""
+    """Where all constraints are: y (e, 2, 3), s, l, r~ (e, 3), and the scaling R, R^-1, d."""
 
     y: FloatArray
     s: FloatArray
@@ -143,14 +143,20 @@ def slack(y: FloatArray, b: float) -> tuple[float, float, float]:
 
 
 @compiled
+def beyond(q: float, s: float) -> float:
+    """q - s, or 0 where that is rounding."""
+    return 0.0 if abs(q - s) < ROUNDING else q - s
+
+
+@compiled
 def widened(y: FloatArray, b: FloatArray, s: FloatArray) -> FloatArray:
     """S + (Q - S)_+, above both S and Q: the larger one where they are numbers."""
     out = s.copy()
     for e in range(len(b)):
         q = slack(y[e], b[e])
-        beyond = (q[0] - s[e, 0], q[1] - s[e, 1], q[2] - s[e, 2])
-        low, high = eigenvalues(beyond)
-        more = with_eigenvalues(beyond, max(low, 0.0), max(high, 0.0))
+        more = (q[0] - s[e, 0], q[1] - s[e, 1], q[2] - s[e, 2])
+        low, high = eigenvalues(more)
+        more = with_eigenvalues(more, max(low, 0.0), max(high, 0.0))
         for i in range(3):
             out[e, i] += more[i]
     return out
@@ -185,31 +191,23 @@ def measure(
 @compiled(error_model="numpy")
 def assemble(G: Rows, slots: Slots, at: Point, b: FloatArray, values: FloatArray) -> float:
     """Scale each element and add its blocks; residuals are filled in, and <S, L> is returned."""
-    H, A, total = np.empty((2, 2, 3, 3)), np.empty((2, 3, 3)), 0.0
+    A, total = np.empty((len(G.corners), 3, 3)), 0.0
     for e in range(len(b)):
         s, l, V, y = entries(at.s, e), entries(at.l, e), at.inverse[e], at.y[e]  # noqa: E741
         scale(s, l, at.R[e], V, at.d[e])
         total += dot(s, l)
         q = slack(y, b[e])
+        r = congruent(V, (beyond(q[0], s[0]), beyond(q[1], s[1]), beyond(q[2], s[2])))
         for i in range(3):
-            r = q[i] - s[i]
-            at.r[e, i] = 0.0 if abs(r) < ROUNDING else r
-        for c in range(2):
-            for i in range(3):
-                p0 = V[0, 0] * y[0, i] + V[0, 1] * y[1, i]
-                p1 = V[1, 0] * y[0, i] + V[1, 1] * y[1, i]
-                A[c, i, 0] = p0 * V[0, c]
-                A[c, i, 1] = p1 * V[1, c]
-                A[c, i, 2] = (p0 * V[1, c] + p1 * V[0, c]) * ROOT_HALF
-        for c in range(2):
-            for f in range(c + 1):
-                for i in range(3):
-                    for j in range(3):
-                        h = A[c, i, 0] * A[f, j, 0] + A[c, i, 1] * A[f, j, 1]
-                        H[c, f, i, j] = h + A[c, i, 2] * A[f, j, 2]
-                    H[c, f, i, i] += l[c] if c == f else l[2]
-        H[0, 1] = H[1, 0].T
-        spread_blocks(G, slots, e, H, values)
+            at.r[e, i] = r[i]
+            p0 = V[0, 0] * y[0, i] + V[0, 1] * y[1, i]
+            p1 = V[1, 0] * y[0, i] + V[1, 1] * y[1, i]
+            for k in range(len(G.corners)):
+                c, d = G.coefficients[e, 0, k], G.coefficients[e, 1, k]
+                u0, u1 = V[0, 0] * c + V[0, 1] * d, V[1, 0] * c + V[1, 1] * d
+                A[k, i, 0], A[k, i, 1] = p0 * u0, p1 * u1
+                A[k, i, 2] = (p0 * u1 + p1 * u0) * ROOT_HALF
+        spread_products(G, slots, e, A, l, values)
     return total
 
 
@@ -224,13 +222,14 @@ def aim(d: FloatArray, mu: float, c: FloatArray) -> None:
 def aim_again(
     at: Point, mu: float, ds: FloatArray, dl: FloatArray, square: FloatArray, c: FloatArray
 ) -> None:
-    """The same less the product of the predictor's changes, and r less dY dY^T/2."""
+    """The same less the product of the predictor's changes, and r~ less R^-1 dY dY^T R^-T/2."""
     aim(at.d, mu, c)
     for e in range(len(c)):
         error = product(entries(ds, e), entries(dl, e))
+        short = congruent(at.inverse[e], entries(square, e))
         for i in range(3):
             c[e, i] -= error[i]
-            at.r[e, i] -= square[e, i]
+            at.r[e, i] -= short[i]
 
 
 @compiled
@@ -250,10 +249,10 @@ def centre(
 
 @compiled(error_model="numpy")
 def push(G: Rows, at: Point, c: FloatArray, h: FloatArray, force: FloatArray) -> None:
-    """h = c/((d_p + d_q)/2) - R^-1 r R^-T, and G^T (R^-T h R^-1 Y) added to `force` (n, 3)."""
+    """h = c/((d_p + d_q)/2) - r~, and G^T (R^-T h R^-1 Y) added to `force` (n, 3)."""
     P = np.empty((2, 3))
     for e in range(len(h)):
-        d, V, y, r = at.d[e], at.inverse[e], at.y[e], congruent(at.inverse[e], entries(at.r, e))
+        d, V, y, r = at.d[e], at.inverse[e], at.y[e], at.r[e]
         h[e, 0] = c[e, 0] / d[0] - r[0]
         h[e, 1] = c[e, 1] / d[1] - r[1]
         h[e, 2] = 2 * c[e, 2] / (d[0] + d[1]) - r[2]
@@ -284,7 +283,7 @@ def change(
             a0 += F[0, i] * y[0, i]
             a1 += F[1, i] * y[1, i]
             a2 += 0.5 * (F[0, i] * y[1, i] + F[1, i] * y[0, i])
-        t, r, across = congruent(V, (a0, a1, a2)), congruent(V, entries(at.r, e)), gram(F)
+        t, r, across = congruent(V, (a0, a1, a2)), at.r[e], gram(F)
         for i in range(3):
             square[e, i] = 0.5 * across[i]
             ds[e, i] = r[i] - t[i]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from solvers.newton_ipm.exact import ExactCones
@@ -23,13 +25,25 @@ LONGER, GROWTH = 0.3, 0.1  # a corrector aims at this longer a step, and must br
 LOW, HIGH = 0.1, 5.0  # products aimed at by correctors, in sigma mu
 BACK_OFF = 0.99
 SNAPSHOT = 0.1  # relative gap
-STRICTER = 100.0  # limits must hold so much better than the gap: they do, but for the last steps
+STRICTER = 10.0  # limits must hold so much better than the gap: they do, but for the last steps
+DEARER = 100.0  # multipliers, than those at hand, where they have no bound
+DRIFT = 0.5  # part of the snapshot's last change that a warm start expects again
 LARGE = 1e3  # multipliers, of the objective: there may be others that are larger still
 CONES: dict[type[Kind], type[SampledCones | ExactCones]] = {
     Sampled: SampledCones,
     Exact: ExactCones,
 }
 ROUNDING = 32 * np.finfo(float).eps  # of a sum of products, as the referee counts it
+
+
+class Snapshot(NamedTuple):
+    """A frame's centred iterate, its target, and how x - target changed since the frame before."""
+
+    x: FloatArray
+    s: FloatArray
+    l: FloatArray  # noqa: E741
+    target: FloatArray
+    drift: FloatArray
 
 
 class State:
@@ -39,7 +53,7 @@ class State:
         self.matrix = Matrix(problem)
         self.linear = best_linear_solver(self.matrix.lower)
         self.cones = CONES[type(problem.kind)](problem, self.matrix.slots)
-        self.snapshot: tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None = None
+        self.snapshot: Snapshot | None = None
         self.cold_iterations = 0
         _ = problem.largest_objective  # its shortest paths are kept with the problem
 
@@ -95,10 +109,10 @@ class Iterate:
         self.cones.start(FLOOR, FIRST_MU * guess / self.cones.degree)
 
     def resume(self) -> None:
-        """From the snapshot, moved as the target has moved."""
+        """From the snapshot, moved as the target has moved, and on as it moved from the target."""
         assert self.state.snapshot is not None
-        x, s, l, target = self.state.snapshot  # noqa: E741
-        self.x = x + (self.target - target)
+        x, s, l, target, drift = self.state.snapshot  # noqa: E741
+        self.x = x + (self.target - target) + DRIFT * drift
         self.x[self.problem.held] = self.target[self.problem.held]
         self.cones.place(self.problem.bounds, self.x)
         self.cones.resume(s, l)
@@ -117,7 +131,7 @@ class Iterate:
         self.priced = objective - bound + price
         self.gap, self.violation = max(0.0, self.priced) / scale, worst
         error = max(STRICTER * worst, self.gap)
-        return error if most < LARGE * scale else max(error, STRICTER * beyond / scale)
+        return error if most < LARGE * scale else max(error, DEARER * beyond / scale)
 
     def step(self) -> None:
         """Steps 3 to 6, and once the snapshot for the next frame where one is kept."""
@@ -169,6 +183,8 @@ class Iterate:
             return dx, self.cones.change(dx)
 
     def _snapshot(self, dx: FloatArray, change: Change) -> None:
-        a = 0.9 * change.length
-        self.state.snapshot = (self.x + a * dx, *self.cones.moved(change, a), self.target)
+        a, last = 0.9 * change.length, self.state.snapshot
+        x = self.x + a * dx
+        drift = np.zeros_like(x) if last is None else (x - self.target) - (last.x - last.target)
+        self.state.snapshot = Snapshot(x, *self.cones.moved(change, a), self.target, drift)
         self.keep = False

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solvers.newton_ipm.symmetric import Symmetric
 from strainbench import Problem
 from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
@@ -56,35 +57,36 @@ class Matrix:
 
 
 @compiled
-def spread_blocks(G: Rows, at: Slots, e: int, H: FloatArray, values: FloatArray) -> None:
-    """Add sum_cf B_ca B_fb H_cf, of H (dim, dim, 3, 3), to the block of each vertex pair a, b."""
+def spread_products(
+    G: Rows,
+    at: Slots,
+    e: int,
+    A: FloatArray,
+    l: Symmetric,  # noqa: E741
+    values: FloatArray,
+) -> None:
+    """Add A_a A_b^T + (B_a^T L B_b) I, of A (k, 3, 3), to the block of each vertex pair a, b."""
     for b in range(len(G.corners)):
         width = at.width[G.vertices[e, b]]
+        c, d = G.coefficients[e, 0, b], G.coefficients[e, 1, b]
+        l0, l1 = l[0] * c + l[2] * d, l[2] * c + l[1] * d
         for a in range(len(G.corners)):
             first = at.first[e, a, b]
             if first < 0:
                 continue
             for j in range(3):
-                k0 = k1 = k2 = 0.0
-                for c in range(len(G.axes)):
-                    for f in range(len(G.axes)):
-                        weight = G.coefficients[e, c, a] * G.coefficients[e, f, b]
-                        k0 += weight * H[c, f, 0, j]
-                        k1 += weight * H[c, f, 1, j]
-                        k2 += weight * H[c, f, 2, j]
                 column = first + j * width - j * (j + 1) // 2
-                if a != b or j < 1:
-                    values[column] += k0
-                if a != b or j < 2:
-                    values[column + 1] += k1
-                values[column + 2] += k2
+                for i in range(0 if a != b else j, 3):
+                    k = A[a, i, 0] * A[b, j, 0] + A[a, i, 1] * A[b, j, 1]
+                    values[column + i] += k + A[a, i, 2] * A[b, j, 2]
+                values[column + j] += G.coefficients[e, 0, a] * l0 + G.coefficients[e, 1, a] * l1
 
 
 @compiled
 def spread_symmetric(G: Rows, at: Slots, e: int, H: FloatArray, values: FloatArray) -> None:
-    """The same for H_cf = H_fc = H_cf^T, whose entries 00, 01, 02, 11, 12, 22 are H (dim, dim, 6).
+    """Add sum_cf B_ca B_fb H_cf to the block of each vertex pair a, b.
 
-    Those with f <= c are read.
+    H_cf = H_fc = H_cf^T, whose entries 00, 01, 02, 11, 12, 22 are H (dim, dim, 6), where f <= c.
     """
     for b in range(len(G.corners)):
         width = at.width[G.vertices[e, b]]

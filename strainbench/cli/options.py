@@ -138,6 +138,15 @@ Units = Annotated[
     bool,
     typer.Option("--units", help="beside factorisation + solve, and a step of implicit Euler"),
 ]
+Checkout = Annotated[
+    Path | None,
+    typer.Option(
+        "--against",
+        parser=path("--against"),
+        metavar="DIR",
+        help="another checkout of strainbench, such as a git worktree: race its solvers too",
+    ),
+]
 Scheduler = Annotated[
     str | None,
     typer.Option("--scheduler", help="address of a dask scheduler whose workers run the cells"),

@@ -18,6 +18,7 @@ from strainbench.cli.options import (
     LOCAL,
     AllSolvers,
     AnyScenarios,
+    Checkout,
     Folder,
     FrameNumbers,
     FramesFolder,
@@ -94,33 +95,40 @@ def let_duel(
     tolerance: Tolerance = 1e-6,
     time_limit: ProjectionSeconds = 60.0,
     units: Units = False,
+    against: Checkout = None,
     results: FramesFolder = LOCAL / "duel",
     output: TableFile = None,
 ) -> None:
-    """Let solvers take turns on the same projections: ratios of times in one run."""
+    """Let solvers, or two versions of them, take turns on the same projections: ratios of times."""
     from strainbench.bench.machine import describe_machine
     from strainbench.bench.plan import plan_available
     from strainbench.document.writers import terminal
     from strainbench.report.output import check_ending, write_output
     from strainbench.studies.duel.measure import duel, parse_frames
     from strainbench.studies.duel.report import Outcome
+    from strainbench.studies.duel.trees import check_tree
 
     sequences = parse_frames(frame)
     if output is not None:
         check_ending(output)
+    other = None if against is None else check_tree(against)
     cells = plan_available(scenario, solver, set_ or [], 1, tolerance, time_limit)
     solvers = [cell.solver.solver() for cell in cells]
     machine, about = describe_machine(threads=1)
     recording = _recorded(cells[0], max(map(max, sequences)), None if units else results)
     with progress() as bar:
-        turns = repeats * sum(map(len, sequences)) * len(cells)
+        turns = repeats * sum(map(len, sequences)) * len(cells) * (1 if other is None else 2)
         turn = partial(bar.advance, bar.add_task("projections", total=turns))
-        entries = duel(solvers, recording, sequences, repeats, tolerance, time_limit, units, turn)
-    for entry, cell in zip(entries, cells, strict=False):  # units of time may follow
+        entries = duel(
+            *(solvers, recording, sequences, repeats, tolerance, time_limit, units, turn, other)
+        )
+    racing = cells if other is None else 2 * cells
+    for entry, cell in zip(entries, racing, strict=False):  # units of time may follow
         entry.label = cell.solver.label
     title = f"{cells[0].scenario.label}, projections {frame}, tolerance {tolerance:g}"
     outcome = Outcome(title, shlex.join(["strainbench", *sys.argv[1:]]), {machine: about}, entries)
-    Console(width=max(console.width, 200)).print(terminal(outcome.table()))  # many columns
+    for table in (outcome.table(), *([outcome.versions()] if other else [])):
+        Console(width=max(console.width, 200)).print(terminal(table))  # many columns
     if output is not None:
         write_output(output, outcome.document(), outcome.cells())
         say(f"wrote {output}")

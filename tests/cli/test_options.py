@@ -80,6 +80,7 @@ NONSENSE = {
     "--results": EMPTY,
     "--output": EMPTY,
     "--scheduler": EMPTY,
+    "--against": ["", " ", "nowhere", "/dev/null"],
     "--solver": NAME,
     "--set": SETTING,
     "--mode": ["", "x", "0", "Replay", "simulate,replay"],

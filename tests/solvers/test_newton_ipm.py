@@ -417,8 +417,8 @@ def test_iterates_do_not_depend_on(change, exact):
 
 
 FRAMES = {  # iterations, cold and warm
-    "sampled": ([21, 21, 20, 22, 21], [21, 6, 5, 7, 9]),
-    "exact": ([15, 16, 16, 17, 17], [15, 5, 5, 5, 6]),
+    "sampled": ([20, 20, 20, 22, 20], [20, 6, 5, 7, 7]),
+    "exact": ([15, 16, 15, 16, 17], [15, 4, 4, 4, 4]),
 }
 ITERATIONS = {  # of each candidate within 1%
     "sampled": [22, 30, 41, 29, 18, 28, 22, 30, 43, 50],

@@ -14,8 +14,10 @@ from strainbench.bench.recording import record, record_all, recorded, recorder
 from strainbench.document.writers import markdown
 from strainbench.report.output import check_ending
 from strainbench.solver.registry import find_solver
-from strainbench.studies.duel.measure import Racer, duel, parse_frames
+from strainbench.studies.duel.measure import duel, parse_frames
+from strainbench.studies.duel.racer import Racer
 from strainbench.studies.duel.report import CSV_HEADER, HEADER, Outcome
+from strainbench.studies.duel.trees import HERE, check_tree
 from tests.cli.test_cli import strainbench
 
 MACHINE = {
@@ -75,6 +77,7 @@ def test_the_referee_judges_the_answers(recording):
     assert exact.worst_violation < 1e-6 > exact.worst_gap
     excess = recording.frame(6).violations(recording.targets[5]).max()
     assert none.worst_violation == pytest.approx(excess)
+    assert exact.worst_distance < 1e-6 < none.worst_distance
     assert exact.unsolved == []
 
 
@@ -143,7 +146,8 @@ def test_ratios_and_units():
     assert [r["times_faster"] for r in (first, second, unit)] == pytest.approx([1, 0.5, 8])
     assert [r["per_factorisation"] for r in (first, second, unit)] == pytest.approx([8, 16, 1])
     table = found.table()
-    assert table.columns == [c for c in HEADER.values() if c.name != "/ implicit Euler"]
+    missing = ("/ implicit Euler", "CPU")
+    assert table.columns == [c for c in HEADER.values() if c.name not in missing]
     assert all(len(line) == len(table.columns) for line in table.lines)
     for text in ("strainbench duel", "here: 1 GB", "| second | 0.1 | 8 | 8 to 8 | 0.50 |"):
         assert text in markdown(found.document())
@@ -176,6 +180,46 @@ def test_the_command_line(tmp_path, ending):
         assert tuple(rows[0]) == CSV_HEADER
         assert [float(r["max_violation"]) < 1e-5 for r in rows[:3]] == [True] * 3
         assert all(float(r["per_factorisation"]) > 0 < float(r["seconds"]) for r in rows)
+
+
+def test_a_checkout_against_itself(tmp_path):
+    words = ["duel", "swing", "--set", "resolution=4", "--frame", "2-4", "--repeats", "3"]
+    both = ["--solver", "newton-ipm,newton-ipm-warm", "--against", str(HERE)]
+    done = strainbench(*words, *both, "-o", "out.md", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = (tmp_path / "out.md").read_text().splitlines()
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    for label in ("newton-ipm", "newton-ipm-warm"):
+        (compared,) = [line for line in cells if line[0] == label]
+        faster, _, clock, now, before, apart = compared[1:]
+        assert 0.2 < float(faster) < 5  # what else the machine does is in it
+        assert float(clock) > 0
+        assert (now, float(apart)) == (before, 0)
+
+
+def test_two_versions_are_compared_turn_by_turn():
+    x = np.zeros((2, 3))
+    here = Racer("a", [1.0], [1.0, 9.0, 2.0], {1: Solution(x, "solved", 3)}, version="new")
+    there = Racer("a", [1.0], [2.0, 9.0, 6.0], {1: Solution(x + 1e-9, "solved", 4)}, version="old")
+    here.cpu, there.cpu = [1.0, 2.0, 4.0], [2.0, 8.0, 4.0]
+    table = outcome(here, there).versions()
+    assert table.title == "new over old"
+    (line,) = table.lines
+    assert line == ["a", 2.0, "1.50 to 3.00", 2.0, 3.0, 4.0, pytest.approx(1e-9)]
+    assert "a (old)" in markdown(outcome(here, there).document())
+
+
+def test_a_checkout_that_cannot_race(tmp_path, recording):
+    with pytest.raises(ValueError, match="another checkout of strainbench is valid"):
+        check_tree(tmp_path)
+    package = tmp_path / "strainbench"
+    package.mkdir()
+    (package / "__init__.py").write_text("raise ImportError('worn out')")
+    newton = [find_solver("newton-ipm")]
+    with pytest.raises(ValueError, match=r"ended: ImportError: worn out"):
+        duel(newton, recording, [[2]], 1, 1e-6, against=check_tree(tmp_path))
+    with pytest.raises(ValueError, match="told is no solver of the suite's own"):
+        duel([Told("told", [])], recording, [[2]], 1, 1e-6, against=HERE)
 
 
 def test_a_wrong_word_is_one_line(tmp_path):

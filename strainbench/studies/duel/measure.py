@@ -7,6 +7,9 @@
    machine does falls on all alike.
 4. The referee measures the answers of the last repeat when all clocks have stopped.
 
+Another checkout's solvers take turns with this one's, each checkout in a process of its own
+(`strainbench.studies.duel.trees`), and the referee of this one measures both.
+
 With units each turn also has one numeric factorisation and one solve of the 3n x 3n matrix in which
 the vertices of an element interact, by the linear solver in use; and the steps of implicit Euler
 are timed while the frames are recorded.
@@ -15,9 +18,10 @@ are timed while the frames are recorded.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from time import perf_counter
-from typing import Any
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any, Protocol
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -29,68 +33,14 @@ from strainbench.options import shown
 from strainbench.physics.linear import best_linear_solver
 from strainbench.physics.pattern import Pattern
 from strainbench.problem.problem import Problem
-from strainbench.referee.certificate import Certificate, certify
+from strainbench.referee.certificate import certify
 from strainbench.referee.reference import ReferenceSolver
-from strainbench.solver.solver import Solution, Solver, run_solver, warm_up
+from strainbench.solver.solver import Solver, run_solver, warm_up
+from strainbench.studies.duel.racer import Racer, Rules
+from strainbench.studies.duel.trees import processes
 
 MOST_FRAMES = 100_000  # all their targets are in memory
 FACTORISATION, IMPLICIT_EULER = "factorisation + solve", "implicit Euler step"
-
-
-@dataclass
-class Racer:
-    """A solver, or a unit of time, and what was measured of it.
-
-    Parameters
-    ----------
-    label : the solver's, or FACTORISATION followed by the linear solver's name, or IMPLICIT_EULER
-    setups, seconds : [s] of each set-up, of each projection
-    answers : of the last repeat, by frame
-    certificates : of the answers
-    """
-
-    label: str
-    setups: list[float] = field(default_factory=list)
-    seconds: list[float] = field(default_factory=list)
-    answers: dict[int, Solution] = field(default_factory=dict)
-    certificates: list[Certificate] = field(default_factory=list)
-
-    @property
-    def setup(self) -> float:
-        """[s], the median; NaN of a unit."""
-        return float(np.median(self.setups)) if self.setups else float("nan")
-
-    @property
-    def median(self) -> float:
-        """[s] a projection; NaN where there was none."""
-        return float(np.median(self.seconds)) if self.seconds else float("nan")
-
-    @property
-    def quartiles(self) -> tuple[float, float]:
-        """[s] between which the middle half of the projections lies."""
-        first, third = np.percentile(self.seconds, [25, 75]) if self.seconds else (np.nan,) * 2
-        return float(first), float(third)
-
-    @property
-    def iterations(self) -> float:
-        """Median over the frames; NaN of a unit."""
-        counts = [a.iterations for a in self.answers.values()]
-        return float(np.median(counts)) if counts else float("nan")
-
-    @property
-    def worst_violation(self) -> float:
-        """Over the frames; NaN where an answer is not usable."""
-        return float(np.max([c.max_violation for c in self.certificates] or [np.nan]))
-
-    @property
-    def worst_gap(self) -> float:
-        """Over the frames; NaN where an answer is not usable."""
-        return float(np.max([c.relative_gap for c in self.certificates] or [np.nan]))
-
-    @property
-    def unsolved(self) -> list[str]:
-        """What it says of frames that it does not call solved."""
-        return sorted({str(a.status) for a in self.answers.values()} - {"solved"})
 
 
 def parse_frames(text: str) -> list[list[int]]:
@@ -113,6 +63,18 @@ def parse_frames(text: str) -> list[list[int]]:
     return [list(range(e[0], e[-1] + 1)) for e in ends]
 
 
+class Runner(Protocol):
+    """Who takes turns: a solver in this process, or in that of a checkout."""
+
+    entry: Racer
+
+    def prepare(self) -> None:
+        """Anew, on a clock of its own."""
+
+    def take_turn(self, number: int, frame: Problem) -> None:
+        """Project one frame, and add it to the entry."""
+
+
 def duel(
     solvers: Sequence[Solver],
     recording: Recording,
@@ -122,44 +84,60 @@ def duel(
     time_limit: float | None = None,
     units: bool = False,
     progress: Callable[[], None] = lambda: None,
+    against: Path | None = None,
 ) -> list[Racer]:
-    """Measure all solvers; with `units` the units follow them.
+    """Measure all solvers; those of another checkout and, with `units`, the units follow.
 
     Parameters
     ----------
     sequences : of frames of the recording, see `parse_frames`
     time_limit : [s] a projection
     progress : told of each turn that has ended
+    against : the other checkout's folder
 
     Raises
     ------
     ValueError
-        One line: a solver cannot take the scene.
+        One line: a solver cannot take the scene, or the other checkout has none of its name.
     """
-    problem = recording.problem
+    problem, rules = recording.problem, Rules(tolerance, time_limit)
     for solver in solvers:
         if refusal := solver.supports(problem):
             raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
-    entries = [Racer(solver.label) for solver in solvers]
-    with fixed_threads(1), threadpool_limits(1):
-        for solver in solvers:
-            warm_up(solver, problem, tolerance)
+    with (
+        fixed_threads(1),
+        threadpool_limits(1),
+        _runners(solvers, problem, rules, against) as runners,
+    ):
         unit = Factorisation(problem) if units else None
         for repeat in range(repeats):
-            turns = list(rotated(list(zip(solvers, entries, strict=True)), repeat))
+            turns = list(rotated(runners, repeat))
             for frames in sequences:
-                ready = [Prepared(solver, problem, entry) for solver, entry in turns]  # 2
+                for turn in turns:  # 2
+                    turn.prepare()
                 for number in frames:
-                    frame = recording.frame(number)
-                    for turn in ready:  # 3
-                        turn.take_turn(number, frame, tolerance, time_limit)
+                    for turn in turns:  # 3
+                        turn.take_turn(number, recording.frame(number))
                         progress()
                     if unit:
                         unit.take_turn()
+    entries = [runner.entry for runner in runners]
     judge(entries, recording)  # 4
     if unit:
         entries += [unit.entry, Racer(IMPLICIT_EULER, seconds=list(recording.step_seconds))]
     return entries
+
+
+@contextmanager
+def _runners(
+    solvers: Sequence[Solver], problem: Problem, rules: Rules, against: Path | None
+) -> Iterator[Sequence[Runner]]:
+    """All that take turns, compiled."""
+    if against is None:
+        yield [Here(solver, problem, rules) for solver in solvers]
+    else:
+        with processes(solvers, problem, rules, against) as runners:
+            yield runners
 
 
 def rotated(items: Sequence[Any], by: int) -> Iterator[Any]:
@@ -168,22 +146,25 @@ def rotated(items: Sequence[Any], by: int) -> Iterator[Any]:
         yield items[(k + by) % len(items)]
 
 
-class Prepared:
-    """A solver that is prepared, with what is measured of it."""
+class Here:
+    """A solver in this process, with what is measured of it."""
 
-    def __init__(self, solver: Solver, problem: Problem, entry: Racer) -> None:
+    def __init__(self, solver: Solver, problem: Problem, rules: Rules) -> None:
+        self._solver, self._problem, self._rules = solver, problem, rules
+        self.entry = Racer(solver.label)
+        warm_up(solver, problem, rules.tolerance)
+
+    def prepare(self) -> None:
+        """Anew, on a clock of its own."""
         begin = perf_counter()
-        self._state = solver.prepare(problem)
-        entry.setups.append(perf_counter() - begin)
-        self._solver, self._entry = solver, entry
+        self._state = self._solver.prepare(self._problem)
+        self.entry.setups.append(perf_counter() - begin)
 
-    def take_turn(
-        self, number: int, frame: Problem, tolerance: float, time_limit: float | None
-    ) -> None:
+    def take_turn(self, number: int, frame: Problem) -> None:
         """Project one frame."""
-        answer = run_solver(self._solver, frame, self._state, tolerance, time_limit)
-        self._entry.seconds.append(answer.seconds)
-        self._entry.answers[number] = answer
+        rules, cpu = self._rules, process_time()
+        answer = run_solver(self._solver, frame, self._state, rules.tolerance, rules.time_limit)
+        self.entry.add(number, answer, process_time() - cpu)
 
 
 def judge(entries: Sequence[Racer], recording: Recording) -> None:
@@ -212,7 +193,8 @@ class Factorisation:
 
     def take_turn(self) -> None:
         """Time it once."""
-        begin = perf_counter()
+        begin, cpu = perf_counter(), process_time()
         self._linear.factorise(self._data)
         self._linear.solve(self._b)
         self.entry.seconds.append(perf_counter() - begin)
+        self.entry.cpu.append(process_time() - cpu)

@@ -6,20 +6,29 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isnan
 
+import numpy as np
+
 from strainbench.document import Column, Document, Prose, Table
 from strainbench.report.machine import machine_line
 from strainbench.report.numbers import power
-from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER, Racer
+from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER
+from strainbench.studies.duel.racer import Racer
 
 EXPLANATION = (
     "One process, one thread; the methods take turns on each frame. Seconds are the median of all "
     "projections, with their quartiles; set-up is apart. Times faster is the first method's median "
-    "over that of the row. Violation and gap are the referee's, the worst over the frames."
+    "over that of the row; CPU is the process's own time, which another's load changes less. "
+    "Violation, gap and distance to the optimum are the referee's, the worst over the frames."
+)
+VERSIONS = (
+    "Each version has a process of its own, and they take turns. Times faster is "
+    "the other's CPU time over this one's in the same turn, the median of all turns; by the clock "
+    "the same of seconds. Apart is how far the answers differ, the largest of all coordinates."
 )
 CSV_HEADER = (
     *("method", "setup_seconds", "seconds", "first_quartile", "third_quartile", "times_faster"),
     *("iterations", "max_violation", "relative_gap", "per_factorisation", "per_implicit_euler"),
-    *("projections", "says", "machine", "command"),
+    *("projections", "says", "machine", "command", "cpu_seconds", "distance_mm"),
 )
 HEADER = {
     "method": Column("method", whole=True),
@@ -30,10 +39,21 @@ HEADER = {
     "iterations": Column("iterations", form="g"),
     "max_violation": Column("violation", form=power),
     "relative_gap": Column("gap", form=power),
+    "distance_mm": Column("distance", "mm", ".1g"),
     "per_factorisation": Column("/ factor. + solve", form=".2f"),
     "per_implicit_euler": Column("/ implicit Euler", form=".2f"),
+    "cpu_seconds": Column("CPU", "s", ".3g"),
     "says": Column("says"),
 }
+COMPARED = (
+    Column("method", whole=True),
+    Column("times faster", form=".2f"),
+    Column("quartiles"),
+    Column("by the clock", form=".2f"),
+    Column("iterations", form="g"),
+    Column("before", form="g"),
+    Column("apart", "m", power),
+)
 UNITS = {"per_factorisation": FACTORISATION, "per_implicit_euler": IMPLICIT_EULER}
 """Columns of ratios to the time of something else, and how its entry begins."""
 
@@ -66,7 +86,7 @@ class Outcome:
         """One an entry, by the columns of CSV_HEADER; NaN where there is nothing."""
         for entry in self.entries:
             values = (
-                entry.label,
+                entry.name,
                 entry.setup,
                 entry.median,
                 *entry.quartiles,
@@ -79,12 +99,16 @@ class Outcome:
                 "; ".join(entry.unsolved),
                 next(iter(self.machines)),
                 self.command,
+                entry.median_cpu,
+                1e3 * entry.worst_distance,
             )
             yield dict(zip(CSV_HEADER, values, strict=True))
 
     def table(self) -> Table:
         """To be read; columns of units only where these were measured."""
         missing = {name for name, seconds in self.units.items() if isnan(seconds)}
+        if not any(entry.cpu for entry in self.entries):
+            missing.add("cpu_seconds")
         shown = {name: column for name, column in HEADER.items() if name not in missing}
         rows = (row | {"quartiles": _quartiles(row)} for row in self.rows())
         return Table(
@@ -96,14 +120,41 @@ class Outcome:
             nothing="-",
         )
 
+    @property
+    def pairs(self) -> list[tuple[Racer, Racer]]:
+        """The same solver of this version and of another, where there are two."""
+        raced = [entry for entry in self.entries if entry.version]
+        half = len(raced) // 2
+        return list(zip(raced[:half], raced[half:], strict=True))
+
+    def versions(self) -> Table:
+        """How much faster each solver became, turn by turn."""
+        versions = " over ".join(entry.version for entry in self.pairs[0])
+        lines = [_compared(*pair) for pair in self.pairs]
+        return Table(versions, COMPARED, lines, about=Prose(VERSIONS), nothing="-")
+
     def document(self) -> Document:
         """All of it, with command and machine."""
         machines = [machine_line(name, facts) for name, facts in self.machines.items()]
-        return Document(f"Duel: {self.title}", [replace(self.table(), title=""), *machines])
+        tables = [replace(self.table(), title=""), *([self.versions()] if self.pairs else [])]
+        return Document(f"Duel: {self.title}", [*tables, *machines])
 
     def cells(self) -> Table:
         """One line an entry."""
         return Table("", CSV_HEADER, [list(row.values()) for row in self.rows()])
+
+
+def _compared(here: Racer, there: Racer) -> list[object]:
+    """A line of the table of versions."""
+    cpu, clock = (np.divide(*t) for t in ((there.cpu, here.cpu), (there.seconds, here.seconds)))
+    first, third = np.percentile(cpu, [25, 75])
+    apart = max(
+        float(np.abs(answer.positions - there.answers[k].positions).max())
+        for k, answer in here.answers.items()
+    )
+    quartiles = f"{first:.2f} to {third:.2f}"
+    faster = float(np.median(cpu)), quartiles, float(np.median(clock))
+    return [here.label, *faster, here.iterations, there.iterations, apart]
 
 
 def _quartiles(row: Mapping[str, object]) -> str:
