@@ -124,9 +124,11 @@ def by_clock(status: str) -> bool:
     return any(words in status.lower() for words in CLOCK)
 
 
-def of_steps(rows: Iterable[Mapping[str, object]]) -> dict[str, object]:
-    """The columns of a cell that has done its steps, from those of its projections."""
-    failed = [(ORDER.index(Failure(str(r["failure"]))), r["step"]) for r in rows if r["failure"]]
+def of_steps(outcome: object, rows: Iterable[Mapping[str, object]]) -> dict[str, object]:
+    """The columns of a cell that has done its steps, from those projections that have its outcome,
+    which is that of the worst."""
+    worst = [r for r in rows if r["outcome"] == outcome and r["failure"]]
+    failed = [(ORDER.index(Failure(str(r["failure"]))), r["step"]) for r in worst]
     if not failed:
         return dict.fromkeys(FAILURES, "")
     kind = min(failed)[0]

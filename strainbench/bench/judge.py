@@ -112,7 +112,7 @@ def _failure(
     """What failed in a cell, and since when; the last projection of one that ended without an
     answer is told the same."""
     if row["outcome"] != OUTCOMES[-1]:
-        return of_steps(rows[:in_time])
+        return of_steps(row["outcome"], rows[:in_time])
     columns = ended(str(row["reason"]), int(str(row["steps_done"])), asked.steps)
     if rows and rows[-1]["outcome"] == OUTCOMES[-1]:
         rows[-1]["failure"] = columns["failure"]
