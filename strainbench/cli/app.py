@@ -18,6 +18,7 @@ import typer
 from strainbench import __version__
 from strainbench.cli.advice import recommend
 from strainbench.cli.display import console, errors, say
+from strainbench.cli.explain import explain_cell
 from strainbench.cli.instances import export_frames, make_test_set
 from strainbench.cli.interrupt import (
     INTERRUPTED,
@@ -88,6 +89,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "testset": make_test_set,
     "ledger": keep_ledger,
     "map": draw_map,
+    "explain": explain_cell,
     "render": render_scene,
     "polar": draw_polar,
 }
