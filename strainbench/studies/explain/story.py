@@ -140,6 +140,6 @@ def _written(story: Story, cell: Cell, found: Replay, output: Path) -> Story:
         paths.append(output / FRAME)
         commands.append(on_frame(cell, output / FRAME))
         paths.append(draw(cell, found, output / PICTURE))
-    blocks = [" ".join(story.sentences), Code("\n".join(commands))]
+    blocks = [" ".join(story.sentences), *map(Code, commands)]
     write_whole(output / TEXT, markdown(Document(story.title, blocks)).encode())
     return Story(story.title, story.sentences, commands, [*paths, output / TEXT])
