@@ -12,6 +12,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from pathlib import Path
 
 import pytest
 
@@ -115,9 +116,7 @@ def test_a_worker_killed_in_a_cell_is_replaced_and_the_cell_run_there(tmp_path, 
 
 
 @pytest.mark.slow
-def test_a_lost_scheduler_is_a_line_and_its_cells_are_run_by_the_next(
-    tmp_path, scheduler, monkeypatch
-):
+def test_a_lost_scheduler_is_a_line_and_no_row(tmp_path, scheduler, monkeypatch):
     monkeypatch.setenv("DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT", "5s")
     process, address = scheduler
     wanted, said = cells(tmp_path), []
@@ -162,3 +161,13 @@ def test_a_worker_of_several_threads_has_one_cell_at_a_time(tmp_path, monkeypatc
         found = list(threads.map(run_elsewhere, cells(tmp_path) * 8, [Settings(tmp_path)] * 8))
     assert len(found) == 8
     assert most == [1]
+
+
+@pytest.mark.slow
+def test_the_script_for_slurm_on_a_cluster_of_this_machine(tmp_path):
+    script = Path(__file__).parents[2] / "docs" / "howto" / "cluster.py"
+    run = [sys.executable, "-m", "strainbench", "run", "stretch-square", "--solver", "none"]
+    words = ["--set", "resolution=2", "--steps", "1", "--results", "out"]
+    command = [sys.executable, str(script), "local", *run, *words]
+    subprocess.run(command, cwd=tmp_path, check=True, timeout=PATIENCE)
+    assert len(latest_runs(tmp_path / "out")) == 1
