@@ -63,7 +63,8 @@ def sentences(found: Map, method: str) -> list[str]:
     """Where a method keeps the limits, and where it reaches the optimum."""
     spots = found.spots[method]
     kept = {point: spot.holds for point, spot in spots.items()}
-    said = [f"{method} {line}." for line in boundary(found.x, found.y, kept)]
+    far = "So far: " if found.open else ""
+    said = [f"{far}{method} {line}." for line in boundary(found.x, found.y, kept)]
     if any(spot.ending == OPTIMAL for spot in spots.values()):
         best = {point: spot.ending == OPTIMAL for point, spot in spots.items()}
         if best != kept:
