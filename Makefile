@@ -15,8 +15,8 @@ TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipo
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test quick check coverage claims docs graph \
-	perf kernels report thumbnails clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick faults check coverage claims docs \
+	graph perf kernels report thumbnails clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -61,6 +61,9 @@ test: setup ## the tests
 
 quick: setup ## the tests without the slow ones: under a minute once compiled
 	$(TESTS) -m "not slow"
+
+faults: setup ## runs, workers and disks killed, filled and damaged, 20 at random; a table; an hour
+	$(BIN)/python -m pytest -q -m faults --kills 20 tests/bench tests/test_files.py
 
 check: setup ## format, lint, types, tests
 	$(BIN)/ruff format --check .

@@ -126,6 +126,7 @@ class Cell:
     time_limit : [s] for physics and solver together, or None
     threads : in the solver's BLAS, OpenMP, numba and rayon
     repeats : times that each projection is timed; the first answer counts
+    patience : steps after the first that violates its limits with which it ends; None for all
     """
 
     scenario: PluginRef
@@ -136,12 +137,14 @@ class Cell:
     time_limit: float | None = None
     threads: int = 1
     repeats: int = 1
+    patience: int | None = None
 
     @property
     def key(self) -> str:
         """A digest of what the cell's numbers depend on, its time limit and repeats apart."""
         plugins = [self.scenario.identity, self.solver.identity]
-        return _digest([*plugins, self.mode, self.steps, self.tolerance, self.threads])
+        early = [] if self.patience is None else [{"patience": self.patience}]
+        return _digest([*plugins, self.mode, self.steps, self.tolerance, self.threads, *early])
 
     @property
     def recording_key(self) -> str:

@@ -11,13 +11,15 @@ runs code on every worker, and so does a plug-in. Use it on a network of your ow
 
 from __future__ import annotations
 
+import errno
 import os
 import pickle
 import subprocess
 import sys
 import threading
 from collections.abc import Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -43,6 +45,7 @@ from strainbench.progress import Observer
 
 Results = tuple[list[dict[str, str]], list[dict[str, str]], dict[str, dict[str, object]]]
 """Rows of runs.csv, rows of steps.csv, machines."""
+ALONE = threading.Lock()  # a worker's
 ASK_SECONDS = 2.0  # between two looks at whether there are workers
 
 
@@ -59,6 +62,8 @@ def run_on_cluster(
     ------
     ValueError
         If dask's `distributed` is not installed, or nothing answers at the address.
+    OSError
+        If the scheduler is lost: what has come back is kept.
     """
     try:
         from distributed import Client
@@ -73,7 +78,7 @@ def run_on_cluster(
         client = Client(address, timeout="10s")
     except (OSError, ValueError) as error:
         raise ValueError(f"--scheduler {address}: nothing answers there ({error})") from None
-    with locked(settings.folder), client:
+    with locked(settings.folder), client, _one_line(address):
         executor = client.get_executor(retries=0)
         futures = {executor.submit(run_elsewhere, cell, settings): cell for cell in wanted}
         for future in _as_completed(futures, client, address, observer):
@@ -86,6 +91,18 @@ def run_on_cluster(
                 _keep(settings.folder, future.result())
                 observer.ended(cell, future.result()[0][0])
     return len(wanted)
+
+
+@contextmanager
+def _one_line(address: str) -> Iterator[None]:
+    """Say in one line that the scheduler is lost, where it is."""
+    from distributed.comm import CommClosedError
+
+    try:
+        yield
+    except (CancelledError, CommClosedError):
+        said = "it was lost; every cell that came back is kept, run the same again to go on"
+        raise OSError(errno.ECONNRESET, said, f"--scheduler {address}") from None
 
 
 def _as_completed(
@@ -113,9 +130,10 @@ def _keep(folder: Path, results: Results) -> None:
 def run_elsewhere(cell: Cell, settings: Settings) -> Results:
     """On a worker: one cell in a process that may have children, as dask's own may not.
 
-    What it prints is no part of its answer. It ends with this one: see `_end_with_worker`.
+    What it prints is no part of its answer. It ends with this one: see `_end_with_worker`. A worker
+    of several threads has one cell at a time, so that no two share its cores.
     """
-    with TemporaryDirectory() as name:
+    with ALONE, TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "task").write_bytes(pickle.dumps((cell, settings)))
         with (folder / OUTPUT).open("wb") as output:

@@ -60,8 +60,11 @@ RUN_COLUMNS = (
     "stolen_seconds",
     "min_principal_stretch",
     "jitter",
+    "failure",
+    "failure_step",
 )
-"""Of `repeats`: `solve_seconds_mean` and `_median` are over the projections' medians."""
+"""Of `repeats`: `solve_seconds_mean` and `_median` are over the projections' medians; of `failure`:
+one of `strainbench.bench.failure`, and the first step of that kind."""
 STEP_COLUMNS = (
     "cell",
     "step",
@@ -103,6 +106,10 @@ STEP_COLUMNS = (
     "seconds_high",
     "seconds_each",
     "min_principal_stretch",
+    "failure",
+    "inverted",
+    "momentum_error",
+    "energy_rise",
 )
 """With repeats, `seconds` is their median, low and high their quartiles, each all as measured."""
 
@@ -114,10 +121,11 @@ WORDS = {
     "seconds_each",
     *("problem", "sampled_by", "ending"),
     *("solver_source", "scenario_source", "content", "suite"),
+    "failure",
 }
 """Columns of runs.csv, steps.csv and convergence.csv that are not numbers."""
 COUNTS = {
-    *("step", "projection", "steps_asked", "steps_done"),
+    *("step", "projection", "steps_asked", "steps_done", "failure_step", "inverted"),
     *("projections", "projections_violated", "projections_optimal", "newton_failures"),
     *("variables", "constraints", "threads", "repeats"),
 }

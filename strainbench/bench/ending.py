@@ -1,8 +1,11 @@
-"""How cells end before their last step: the taxonomy of failures, in words."""
+"""How cells end before their last step, in words, and the thresholds of those that do not."""
 
 from __future__ import annotations
 
 from enum import StrEnum
+
+VIOLATION, GAP = 1e-6, 1e-4
+"""The thresholds of every outcome in a results folder; printed with each table."""
 
 
 class Ending(StrEnum):

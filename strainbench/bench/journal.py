@@ -46,6 +46,7 @@ FACTS: dict[str, dict[str, type | tuple[type, ...]]] = {
         "details": dict,
     },
     "step": {"step": int, **{f.name: NUMBER for f in fields(StepReport)}},
+    "enough": {},
     "repeating": {"peak_memory_mb": NUMBER},
     "again": {"projection": int, "begin": NUMBER, "end": NUMBER, "seconds": NUMBER},
     "iterate": {"tolerance": NUMBER, "seconds": NUMBER, "iterations": int, "status": str},

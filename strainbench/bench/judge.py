@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
 
 from strainbench.bench.cell import Cell
-from strainbench.bench.ending import Ending
+from strainbench.bench.ending import GAP, VIOLATION, Ending
+from strainbench.bench.failure import ended, of_projection, of_steps, rises
 from strainbench.bench.journal import Events, only, read_events, read_frames, read_journal
 from strainbench.bench.mode import replays
-from strainbench.bench.rows import GAP, VIOLATION, Verdict, run_row, step_rows, times
+from strainbench.bench.rows import Verdict, run_row, step_rows, times
 from strainbench.referee.certificate import OUTCOMES, Certificate, certify
+from strainbench.referee.conduct import Conduct, conduct
 from strainbench.referee.motion import jitter
 from strainbench.referee.reference import Kept, ReferenceSolver
 
@@ -43,20 +46,24 @@ def judge(cell: Cell, folder: Path, ending: str, kept: Kept | None = None) -> Ve
     begin = time.perf_counter()
     events, damage = read_journal(folder)
     projections = only(events, "projection")
-    certificates = _certificates(cell, folder, len(projections), kept)
-    rows = step_rows(cell, events, [vars(c) for c in certificates])
+    certificates, conducts = _certificates(cell, folder, len(projections), kept)
+    failed = _failures(events, certificates, conducts)
+    rows = step_rows(cell, events, [vars(c) | f for c, f in zip(certificates, failed, strict=True)])
     in_time = len(_in_time(cell, events))
     if in_time < len(projections):  # what came back late is no answer, nor is its step done
         ending = ending or f"{Ending.TIME_LIMIT} of {cell.time_limit:g} s"
         late = projections[in_time]["step"]
         events = [e for e in events if e["event"] != "step" or e["step"] < late]
     counted, steps = certificates[:in_time], len(only(events, "step"))
-    outcome, reason = _outcome(cell, events, counted, steps, ending or damage)
+    early = _ended_early(cell, events, counted)
+    asked = replace(cell, steps=steps) if early else cell
+    outcome, reason = _outcome(asked, events, counted, steps, ending or damage)
     whole = steps == cell.steps  # of one that was cut short nothing is to be expected
     missed = _missed(cell, folder, len(projections)) if whole else []
     row = run_row(cell, events, counted, ending)
-    row |= {"outcome": outcome, "reason": "; ".join(filter(None, [reason, *missed]))}
+    row |= {"outcome": outcome, "reason": "; ".join(filter(None, [early, reason, *missed]))}
     row["jitter"] = _jitter(cell, folder, projections)
+    row |= _failure(asked, row, rows, in_time)
     row["judge_seconds"] = time.perf_counter() - begin
     return row, rows
 
@@ -69,22 +76,59 @@ def unjudged(cell: Cell, folder: Path, ending: str, failure: str) -> Verdict:
     if ending:
         reason += f"; before that, {ending}"
     row = run_row(cell, events, [], ending) | verdict | {"reason": reason}
+    row |= ended(cell, reason, steps)
     return row, step_rows(cell, events, [verdict] * len(only(events, "projection")))
 
 
-def _certificates(cell: Cell, folder: Path, count: int, kept: Kept | None) -> list[Certificate]:
+def _certificates(
+    cell: Cell, folder: Path, count: int, kept: Kept | None
+) -> tuple[list[Certificate], list[Conduct]]:
     if not count:
-        return []
+        return [], []
     problem = cell.scenario.scenario().problem()
     references = ReferenceSolver(problem, kept)
-    certificates = []
+    certificates, conducts = [], []
     with (folder / JUDGED).open("wb") as judged:
         for target, positions in read_frames(folder, count):
             frame = problem.with_target(target)
             certificates.append(certify(frame, positions, VIOLATION, GAP, references(frame)))
+            conducts.append(conduct(frame, positions))
             judged.write(b".")
             judged.flush()
-    return certificates
+    return certificates, conducts
+
+
+def _failures(
+    events: Events, certificates: Sequence[Certificate], conducts: Sequence[Conduct]
+) -> Iterator[dict[str, object]]:
+    """What failed in each projection, and the measures of it."""
+    rise = rises(events)
+    for event, found, done in zip(only(events, "projection"), certificates, conducts, strict=True):
+        more = rise.get(event["step"], float("nan"))
+        kind = of_projection(found, done, event, more)
+        yield {"failure": kind.value if kind else "", "energy_rise": more, **vars(done)}
+
+
+def _failure(
+    asked: Cell, row: dict[str, object], rows: list[dict[str, object]], in_time: int
+) -> dict[str, object]:
+    """What failed in a cell, and since when; the last projection of one that ended without an
+    answer is told the same."""
+    if row["outcome"] != OUTCOMES[-1]:
+        return of_steps(row["outcome"], rows[:in_time])
+    columns = ended(asked, str(row["reason"]), int(str(row["steps_done"])))
+    if rows and rows[-1]["outcome"] == OUTCOMES[-1]:
+        rows[-1]["failure"] = columns["failure"]
+    return columns
+
+
+def _ended_early(cell: Cell, events: Events, certificates: Sequence[Certificate]) -> str:
+    """Whether a cell ended as it may, soon after limits were violated, in words, or ""."""
+    steps = len(only(events, "step"))
+    violated = any(c.outcome == "violated" for c in certificates)
+    if cell.patience is None or not (violated and only(events, "enough")):
+        return ""
+    return f"ended early, after step {steps} of {cell.steps}"
 
 
 def _missed(cell: Cell, folder: Path, count: int) -> list[str]:

@@ -22,7 +22,7 @@ from threadpoolctl import threadpool_info
 
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
-from strainbench.bench.ending import Ending
+from strainbench.bench.ending import VIOLATION, Ending
 from strainbench.bench.journal import GO, Journal, only, read_events, read_frames, read_targets
 from strainbench.bench.nursery import untouched_mb
 from strainbench.physics.integrators import Project
@@ -74,7 +74,7 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
         raise Stop(f"{Ending.UNSUPPORTED}: {refusal}")
     stage.warm_up(physics=recording is None)
     wait_for_go(folder, journal)
-    timer = _Timer(cell.time_limit, journal.clock)
+    timer, failing = _Timer(cell.time_limit, journal.clock), list[int]()
     stage.set_up()
     journal.write("setup", seconds=timer.elapsed())
 
@@ -82,12 +82,17 @@ def _play(cell: Cell, folder: Path, journal: Journal, recording: Path | None) ->
         timer.check()
         projection = stage.solve(target, timer.remaining())
         write_down(journal, projection)
+        if cell.patience is not None and violates(projection):
+            failing.append(stage.step)
         return stage.accept(projection)
 
     first, last = cell.window
     fed = partial(replay, recording, first) if recording else None
     for report in stage.steps(cell.steps, project, fed, first):
         journal.write("step", step=stage.step, **vars(report))
+        if failing and cell.patience is not None and stage.step >= failing[0] + cell.patience:
+            journal.write("enough")
+            return
         if stage.step < last:
             timer.check()
 
@@ -197,6 +202,15 @@ class _Timer:
         remaining = self.remaining()
         if remaining is not None and remaining <= 0:
             raise Stop(f"{Ending.TIME_LIMIT} of {self._limit:g} s")
+
+
+def violates(projection: Projection) -> bool:
+    """Whether an answer is beyond the limits of its problem, as far as it is one."""
+    if projection.fault:
+        return False
+    with np.errstate(all="ignore"):  # an answer may be infinitely wrong
+        worst = projection.frame.violations(projection.solution.positions).max()
+    return not worst <= VIOLATION
 
 
 def write_down(journal: Journal, projection: Projection) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from strainbench.bench.cell import Cell, PluginRef
-from strainbench.bench.ending import Ending
+from strainbench.bench.ending import GAP, VIOLATION, Ending
 from strainbench.bench.faults import SCHEMA
 from strainbench.bench.journal import Events, only
 from strainbench.bench.mode import replays
@@ -18,8 +18,6 @@ from strainbench.referee.certificate import Certificate
 from strainbench.scenario.scenario import StepReport
 from strainbench.sources import suite_digest
 
-VIOLATION, GAP = 1e-6, 1e-4
-"""The thresholds of every outcome in a results folder; printed with each table."""
 Verdict = tuple[dict[str, object], list[dict[str, object]]]
 """The row of a cell and those of its projections."""
 LOADED = ("variables", "constraints", "nonzeros", "needs", "blas_threads")
@@ -69,7 +67,7 @@ def identity(cell: Cell) -> dict[str, object]:
 def step_rows(
     cell: Cell, events: Events, verdicts: Sequence[Mapping[str, object]]
 ) -> list[dict[str, object]]:
-    """A row a projection, with the fields of its certificate."""
+    """A row a projection, with the fields of its certificate and what failed in it."""
     steps = {e["step"]: e for e in only(events, "step")}
     projections = zip(only(events, "projection"), times(events), verdicts, strict=True)
     return [

@@ -19,6 +19,7 @@ from pathlib import Path
 from strainbench.bench.cell import Cell
 from strainbench.bench.court import POLL_SECONDS, Court
 from strainbench.bench.ending import Ending
+from strainbench.bench.failure import ended
 from strainbench.bench.isolation import Running
 from strainbench.bench.journal import keep_targets
 from strainbench.bench.machine import describe_machine, fixed_threads
@@ -226,6 +227,8 @@ class Runner:
 
     def write(self, cell: Cell, row: dict[str, object], steps: Sequence[dict[str, object]]) -> None:
         """Append a cell's rows and tell the observer."""
+        if "failure" not in row:  # it never began
+            row |= ended(cell, str(row["reason"]), 0)
         row["finished_at"] = datetime.now(UTC).isoformat(timespec="seconds")
         row["machine"] = self._machines.get(cell.threads, "")
         write_cell(self.settings.folder, row, steps)

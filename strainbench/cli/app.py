@@ -19,6 +19,7 @@ from strainbench import __version__
 from strainbench.cli.advice import recommend
 from strainbench.cli.claims import audit_claims
 from strainbench.cli.display import console, errors, say
+from strainbench.cli.explain import explain_cell
 from strainbench.cli.instances import export_frames, make_test_set
 from strainbench.cli.interrupt import (
     INTERRUPTED,
@@ -91,6 +92,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "testset": make_test_set,
     "ledger": keep_ledger,
     "map": draw_map,
+    "explain": explain_cell,
     "render": render_scene,
     "polar": draw_polar,
     "claims": audit_claims,

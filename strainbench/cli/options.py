@@ -45,6 +45,10 @@ Steps = Annotated[int, _whole("--steps", "time steps")]
 StepsOrAll = Annotated[
     int | None, _whole("--steps", "time steps a cell; if not given, what the scene takes")
 ]
+MapSteps = Annotated[
+    int | None,
+    _whole("--steps", "time steps a cell; if not given, 40, or 2 s of the scene if that is longer"),
+]
 StepsToLast = Annotated[int, _whole("--steps", "time steps; the last one is drawn")]
 Every = Annotated[int, _whole("--every", "keep each K-th step", metavar="K")]
 SomeSteps = Annotated[

@@ -6,6 +6,7 @@ import re
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -19,10 +20,10 @@ from strainbench.cli.options import (
     Folder,
     Jobs,
     ManyValues,
+    MapSteps,
     Memory,
     OneScenario,
     Solvers,
-    Steps,
     Tolerance,
 )
 from strainbench.cli.run import Display
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from strainbench.bench.cell import Cell
 
 UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
-STEPS = 40
 
 
 def draw_map(
@@ -41,7 +41,7 @@ def draw_map(
     x: Annotated[str, typer.Option("--x", help="KEY=FROM..TO or KEY=V1,V2, across")],
     y: Annotated[str, typer.Option("--y", help="the same, upwards")],
     set_: ManyValues = None,
-    steps: Steps = STEPS,
+    steps: MapSteps = None,
     duration: Duration = None,
     tolerance: Tolerance = 1e-6,
     time_limit: CellSeconds = 20.0,
@@ -52,7 +52,6 @@ def draw_map(
 ) -> None:
     """Map where methods fail over two settings, refined along the boundaries; resumes."""
     from strainbench.bench.machine import memory_share
-    from strainbench.bench.plan import plan
     from strainbench.bench.runner import Settings
     from strainbench.studies.stability import measure, parse_axis, sentences, write_map
 
@@ -61,14 +60,15 @@ def draw_map(
         raise ValueError(f"--x and --y are both {shown(across.key)}: two settings make a map")
     seconds = parse_budget(budget)
     settings = Settings(results, jobs, memory_limit or memory_share(jobs))
-    asked = None if duration else steps
 
     def planner(words: Sequence[str]) -> list[Cell]:
         both = [*(set_ or []), *words]
-        return plan([scenario], solver, both, "simulate", asked, [tolerance], time_limit, duration)
+        return _cells(scenario, solver, both, steps, duration, tolerance, time_limit)
 
     with Display(lines=False) as display, keeping(lambda: display.kept(display.finished)):
         found = measure(across, up, planner, settings, seconds, display)
+    found.lasts = _lasts(steps, duration)
+    say(f"{found.counted}; {found.lasts[0].lower()}{found.lasts[1:]}")
     for method in found.spots:
         for sentence in sentences(found, method):
             say(sentence)
@@ -78,6 +78,33 @@ def draw_map(
     command = shlex.join(["strainbench", *sys.argv[1:]])
     for written in write_map(found, title, command, results):
         say(f"wrote {written}")
+
+
+def _cells(
+    scenario: str,
+    solver: list[str],
+    words: Sequence[str],
+    steps: int | None,
+    duration: float | None,
+    tolerance: float,
+    time_limit: float | None,
+) -> list[Cell]:
+    """The cells of a point of the map, which end soon after their first failure."""
+    from strainbench.bench.plan import plan
+    from strainbench.studies.stability import PATIENCE, lasting
+
+    length = (1 if steps is None and duration is None else steps, [tolerance], time_limit, duration)
+    cells = plan([scenario], solver, words, "simulate", *length)
+    whole = cells if steps or duration else lasting(cells)
+    return [replace(cell, patience=PATIENCE) for cell in whole]
+
+
+def _lasts(steps: int | None, duration: float | None) -> str:
+    from strainbench.studies.stability import FEWEST, LONG, PATIENCE
+
+    longest = f"the longer of {LONG:g} s of the scene and {FEWEST} steps"
+    length = f"{duration:g} s of the scene" if duration else f"{steps} steps" if steps else longest
+    return f"A cell lasts {length}, and ends {PATIENCE} steps after limits are first violated."
 
 
 def parse_budget(text: str) -> float:

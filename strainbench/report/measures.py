@@ -15,6 +15,7 @@ import pandas as pd
 
 from strainbench.bench.columns import STEP_COLUMNS, WORDS
 from strainbench.bench.ending import Ending
+from strainbench.bench.failure import by_clock
 from strainbench.report.numbers import power
 
 OPTIMAL, FEASIBLE, VIOLATED = "optimal", "feasible", "violated"
@@ -24,8 +25,6 @@ ENDINGS = (OPTIMAL, FEASIBLE, VIOLATED, OUT_OF_TIME, NO_ANSWER)
 COUNT = (OPTIMAL, FEASIBLE)
 """Those of which times and distances count."""
 SIGNS = {OPTIMAL: "✓", FEASIBLE: "○", VIOLATED: "✗", OUT_OF_TIME: "✗", NO_ANSWER: "✗"}
-CLOCK = ("time limit", "time_limit", "user_limit", "time out", "timeout", "max_time")
-"""What solvers say, in lower case, where the clock ended a projection."""
 STEPS = ("steps_asked", "steps_done")
 NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
@@ -94,11 +93,6 @@ def every_time(steps: pd.DataFrame) -> list[list[float]]:
         [float(word) for word in each.split()] if each else [float(once)]
         for once, each in given.itertuples(index=False)
     ]
-
-
-def by_clock(status: str) -> bool:
-    """Whether a solver says that its time was over."""
-    return any(words in status.lower() for words in CLOCK)
 
 
 def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:

@@ -8,6 +8,7 @@ import pandas as pd
 
 from strainbench.bench.columns import WORDS
 from strainbench.bench.records import RecordsError
+from strainbench.report.drift import with_drift
 from strainbench.report.measures import measured
 from strainbench.report.names import with_names
 from strainbench.report.steps import newest_steps
@@ -31,4 +32,5 @@ def load_runs(folder: Path) -> pd.DataFrame:
     for column in runs.columns.difference([*WORDS, "older"]):
         runs[column] = pd.to_numeric(runs[column])
     named = with_names(runs)
-    return measured(named, newest_steps(folder, named))
+    steps = newest_steps(folder, named)
+    return with_drift(measured(named, steps), steps)

@@ -97,6 +97,21 @@ FAILURES = {
     "slow-clock": "the clock was tampered with: it says",
     "false-claim": "the clock was tampered with: solves of 0.00 s by its account took",
 }
+KINDS = {
+    "crash": "crashed",
+    "exit-0": "crashed",
+    "no-memory": "memory",
+    "hoard": "memory",
+    "children-hoard": "memory",
+    "nan": "not a number",
+    "refuse": "refused",
+    "hang": "time limit",
+    "hang-prepare": "time limit",
+    "raise": "error",
+    "shape": "error",
+    "junk": "false records",
+    "false-claim": "false records",
+}
 HARMLESS = [
     "lie",
     "long-status",
@@ -116,6 +131,14 @@ HARMLESS = [
 def test_a_failure_is_a_row_with_its_reason(rows, solver):
     assert rows[solver]["outcome"] == "no answer"
     assert FAILURES[solver] in rows[solver]["reason"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", KINDS)
+def test_a_failure_is_of_a_kind_and_begins_in_a_step(rows, solver):
+    assert rows[solver]["failure"] == KINDS[solver]
+    first = {"hang": "3", "refuse": "", "false-claim": "3"}.get(solver, "1")
+    assert rows[solver]["failure_step"] == first
 
 
 @pytest.mark.slow
@@ -149,9 +172,13 @@ def test_steps_before_a_failure_are_kept(rows):
     assert float(rows["hang"]["max_principal_stretch"]) > 1
 
 
+FOUND_OUT = ("says solved and is not", "over-stretched")
+
+
 def test_a_lie_is_found_out(rows):
     assert rows["lie"]["outcome"] == rows["none"]["outcome"] == "violated"
     assert float(rows["lie"]["max_violation"]) > 1e-3
+    assert (rows["lie"]["failure"], rows["none"]["failure"]) == FOUND_OUT
     assert float(rows["lie"]["solve_seconds_mean"]) > 0  # the suite's clock, not the solver's
 
 

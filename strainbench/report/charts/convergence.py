@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from strainbench.bench.rows import GAP, VIOLATION
+from strainbench.bench.ending import GAP, VIOLATION
 from strainbench.report.charts.axes import (
     Axis,
     count_tick,

@@ -20,6 +20,7 @@ from strainbench.bench.ending import Ending
 from strainbench.bench.isolation import Running
 from strainbench.bench.journal import read_events, read_frames
 from strainbench.bench.machine import describe_machine, fixed_threads
+from strainbench.bench.play import Task
 from strainbench.bench.process import family
 from strainbench.bench.records import (
     RecordsError,
@@ -159,10 +160,12 @@ def keep(folder: Path, rows: Rows) -> None:
     write_rows(path, COLUMNS, [*others, *rows])
 
 
-def run_alone(cell: Cell, folder: Path, frame: Path, memory_limit_mb: float) -> Running:
+def run_alone(
+    cell: Cell, folder: Path, frame: Path | None, memory_limit_mb: float, task: Task = trace_cell
+) -> Running:
     """Run a cell in a process of its own, to its end."""
     with family() as ours:
-        item = Running.start(ours, cell, folder, frame, memory_limit_mb, trace_cell)
+        item = Running.start(ours, cell, folder, frame, memory_limit_mb, task)
         while not item.has_ended():
             if item.is_ready():
                 item.release()

@@ -82,6 +82,7 @@ def _values(found: Map, method: str) -> list[dict[str, object]]:
         }
         if spot:
             time = duration(spot.seconds) if spot.seconds == spot.seconds else ""
-            value |= {"time": time, "why": spot.why, "fails in step": spot.step, "cell": spot.cell}
+            value |= {"time": time, "why": spot.why, "failure": spot.failure}
+            value |= {"fails in step": spot.step, "cell": spot.cell}
         values.append(value)
     return values

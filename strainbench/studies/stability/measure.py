@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
 
@@ -23,6 +23,11 @@ from strainbench.report.measures import COUNT, finish, numbers, timing
 from strainbench.studies.stability.axis import Axis
 from strainbench.studies.stability.refine import Point, inferred, wanted
 
+LONG, FEWEST = 2.0, 40
+"""Seconds of a scene's time, and steps: within the longer of them outcomes settle. Counts run out
+by step 21, cloth explodes by step 40 (swing, 10 squares)."""
+BATCH = 64  # cells at most between two looks at the budget
+PATIENCE = 2  # steps after the first that violates its limits
 Planner = Callable[[Sequence[str]], list[Cell]]
 """The cells of all methods with so many further words of --set."""
 
@@ -35,15 +40,19 @@ class Spot:
     ----------
     ending : one of `strainbench.report.measures.ENDINGS`
     why : in a few words, where it failed
+    failure : its kind (`strainbench.bench.failure`), or "" of what is optimal
     step : the first that did not end within the limits, or None
-    share : of the steps asked for, those that did
+    time : of the scene at that step's end [s]; NaN where it has no end, or no time passes
+    share : of the steps that were begun, those that failed
     seconds : median of a projection that had something to do; NaN without any
     """
 
     cell: str
     ending: str
     why: str
+    failure: str
     step: int | None
+    time: float
     share: float
     seconds: float
 
@@ -60,6 +69,7 @@ class Map:
     Attributes
     ----------
     spots : by method, and by index along x and y
+    lasts : how long its cells are, in words
     open : points that the refinement still asks for, where the budget ended it
     """
 
@@ -67,6 +77,15 @@ class Map:
     y: Axis
     spots: dict[str, dict[Point, Spot]] = field(default_factory=dict)
     open: int = 0
+    lasts: str = ""
+
+    @property
+    def counted(self) -> str:
+        """How many cells were run, and how many that saved, in words."""
+        run = sum(len(spots) for spots in self.spots.values())
+        whole = self.shape[0] * self.shape[1] * len(self.spots)
+        saved = "" if self.open else f": {100 * (1 - run / whole):.0f}% were saved"
+        return f"{run} cells were run of the {whole} of the full grids{saved}"
 
     @property
     def shape(self) -> Point:
@@ -101,11 +120,12 @@ def measure(
     """
     until = time.monotonic() + budget
     plans: dict[Point, dict[str, Cell]] = {}
+    swept = any("." in axis.key for axis in (x, y))
 
     def plan(point: Point) -> dict[str, Cell]:
         if point not in plans:
             cells = planner([x.setting(point[0]), y.setting(point[1])])
-            plans[point] = {cell.solver.name: cell for cell in cells}
+            plans[point] = {_method(cell, swept): cell for cell in cells}
         return plans[point]
 
     plan((len(x.words) - 1, len(y.words) - 1))  # words that are wrong fail here
@@ -116,11 +136,28 @@ def measure(
         if not asked or time.monotonic() > until:
             found.open = len(asked)
             return found
-        cells = {(method, point): plan(point)[method] for method, point in sorted(asked)}
+        batch = sorted(asked, key=lambda a: (a[1], a[0]))[:BATCH]
+        cells = {(method, point): plan(point)[method] for method, point in batch}
         Runner(settings, observer).run(list(cells.values()))
         spots = read_spots(settings.folder, [cell.key for cell in cells.values()])
         for (method, point), cell in cells.items():
             found.spots[method][point] = spots[cell.key]
+
+
+def lasting(cells: Sequence[Cell]) -> list[Cell]:
+    """The same cells, each as long as its outcome needs to settle: LONG or FEWEST steps."""
+    found = []
+    for cell in cells:
+        step = dict(cell.scenario.parameters).get("step")
+        passes = isinstance(step, int | float) and step > 0
+        steps = max(FEWEST, round(LONG / float(str(step)))) if passes else FEWEST
+        found.append(replace(cell, steps=steps))
+    return found
+
+
+def _method(cell: Cell, swept: bool) -> str:
+    """What a method is called in all cells of a map, also where a setting of its own is swept."""
+    return cell.solver.label.partition("[")[0] if swept else cell.solver.label
 
 
 def read_spots(folder: Path, keys: Sequence[str]) -> dict[str, Spot]:
@@ -137,7 +174,11 @@ def read_spots(folder: Path, keys: Sequence[str]) -> dict[str, Spot]:
 
 def _spot(run: pd.Series, steps: pd.DataFrame) -> Spot:
     end, done = finish(run, steps), int(run["steps_done"])
-    failed = steps.loc[~steps["outcome"].isin(COUNT), "step"]
-    first = None if end.counts else int(failed.min()) if len(failed) else done + 1
-    share = (done - failed.nunique()) / int(run["steps_asked"])
-    return Spot(str(run["cell"]), end.ending, end.why, first, share, timing(steps).median)
+    failed = steps.loc[~steps["outcome"].isin(COUNT)]
+    each = set(failed["step"]) | (set() if end.counts or len(failed) else {done + 1})
+    first = int(min(each)) if each else None
+    begun, there = set(steps["step"]) | each, steps[steps["step"] == first]
+    time = float(there["time"].max()) if len(there) else nan
+    failure = next(iter(failed["failure"]), "") or run["failure"]
+    share, seconds = len(each) / max(1, len(begun)), timing(steps).median
+    return Spot(str(run["cell"]), end.ending, end.why, failure, first, time, share, seconds)

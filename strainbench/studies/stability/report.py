@@ -20,8 +20,8 @@ EXPLANATION = (
     "where outcomes along a line change more than once it says irregular."
 )
 CELLS = (
-    *("method", "x", "y", "outcome", "why", Column("first failing step"), Column("share of steps")),
-    *(Column("median", "s"), "cell"),
+    *("method", "x", "y", "outcome", "why", "failure", Column("first failing step")),
+    *(Column("time of that", "s"), Column("share of failed steps"), Column("median", "s"), "cell"),
 )
 
 
@@ -43,9 +43,7 @@ def write_map(found: Map, title: str, command: str, folder: Path) -> list[Path]:
 
 def as_document(found: Map, title: str, command: str) -> Document:
     """The boundary of each method in words, then its grid."""
-    counts = [len(spots) for spots in found.spots.values()]
-    whole = found.shape[0] * found.shape[1] * len(counts)
-    about = f"{sum(counts)} cells were run of the {whole} of the full grids."
+    about = f"{found.counted}. {found.lasts}".strip()
     if found.open:
         about += f" The budget ended it with {found.open} more to run: the same command goes on."
     sections = [_section(found, method) for method in found.spots]
@@ -65,7 +63,8 @@ def sentences(found: Map, method: str) -> list[str]:
     """Where a method keeps the limits, and where it reaches the optimum."""
     spots = found.spots[method]
     kept = {point: spot.holds for point, spot in spots.items()}
-    said = [f"{method} {line}." for line in boundary(found.x, found.y, kept)]
+    far = "So far: " if found.open else ""
+    said = [f"{far}{method} {line}." for line in boundary(found.x, found.y, kept)]
     if any(spot.ending == OPTIMAL for spot in spots.values()):
         best = {point: spot.ending == OPTIMAL for point, spot in spots.items()}
         if best != kept:
@@ -85,5 +84,5 @@ def _cells(found: Map) -> Iterator[tuple[object, ...]]:
     for method, spots in found.spots.items():
         for (i, j), spot in sorted(spots.items()):
             where = found.x.shown[i], found.y.shown[j]
-            end = spot.ending, spot.why, spot.step, spot.share
+            end = spot.ending, spot.why, spot.failure, spot.step, spot.time, spot.share
             yield (method, *where, *end, spot.seconds, spot.cell)
