@@ -109,6 +109,11 @@ class Scenario(ABC):
         return []
 
     @property
+    def projects(self) -> bool:
+        """Whether candidates are to be projected; where not, the solver "none" alone fits."""
+        return True
+
+    @property
     def first_step(self) -> float:
         """The step in which what the scene is about begins, as far as that is known."""
         return 1
