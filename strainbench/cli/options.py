@@ -53,6 +53,7 @@ SomeSteps = Annotated[
 Duration = Annotated[
     float | None, _seconds("--duration", "of the scene's time a cell, instead of --steps")
 ]
+ComparedSeconds = Annotated[float, _seconds("--duration", "of the scene's time a cell")]
 FrameNumber = Annotated[int, _whole("--frame", "which projection, the first being 1", metavar="K")]
 FrameNumbers = Annotated[
     str,

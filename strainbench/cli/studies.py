@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from collections.abc import Sequence
@@ -18,9 +19,11 @@ from strainbench.cli.options import (
     LOCAL,
     AllSolvers,
     AnyScenarios,
+    ComparedSeconds,
     Folder,
     FrameNumbers,
     FramesFolder,
+    ManyValues,
     OneScenario,
     OneSolver,
     ProjectionSeconds,
@@ -124,6 +127,41 @@ def let_duel(
     if output is not None:
         write_output(output, outcome.document(), outcome.cells())
         say(f"wrote {output}")
+
+
+def compare_steps(
+    scenario: OneScenario,
+    solver: Solvers,
+    set_: ManyValues = None,
+    duration: ComparedSeconds = 0.5,
+    tolerance: Tolerance = 1e-6,
+    results: Folder = LOCAL / "step",
+) -> None:
+    """Compare closed loops with the motion whose steps are constrained whole: distances in mm."""
+    from strainbench.bench.machine import fixed_threads
+    from strainbench.bench.plan import plan
+    from strainbench.document.writers import terminal
+    from strainbench.studies.step import measure, tables, write_distances
+
+    words = [as_decimals(word) for word in set_ or []]
+    cells = plan([scenario], solver, words, "simulate", None, [tolerance], None, duration)
+    with fixed_threads(1), tracking() as track:
+        rows = list(track(measure(cells), "playing", len(cells)))
+    command = shlex.join(["strainbench", *sys.argv[1:]])
+    for table in tables(rows):
+        Console(width=max(console.width, 160)).print(terminal(table))
+    for file in write_distances(rows, command, results):
+        say(f"wrote {file}")
+
+
+def as_decimals(word: str) -> str:
+    """KEY=V1,V2 with fractions of whole numbers, such as 1/60, as decimals."""
+    key, equals, values = word.partition("=")
+    return key + equals + re.sub(r"(?<![\w./])(\d+)/([1-9]\d*)(?![\w./])", _decimal, values)
+
+
+def _decimal(fraction: re.Match[str]) -> str:
+    return repr(int(fraction[1]) / int(fraction[2]))
 
 
 def keep_ledger(
