@@ -114,6 +114,11 @@ SolversValues = Annotated[
     typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
 ]
 
+Enough = Annotated[
+    bool,
+    typer.Option("--enough", help="of one scene: directions, mesh and step that are enough"),
+]
+
 # how to run
 Mode = Annotated[str, typer.Option("--mode", help="simulate (closed loop) or replay (same frames)")]
 CellSeconds = Annotated[

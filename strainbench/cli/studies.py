@@ -20,6 +20,7 @@ from strainbench.cli.options import (
     AllSolvers,
     AnyScenarios,
     ComparedSeconds,
+    Enough,
     Folder,
     FrameNumbers,
     FramesFolder,
@@ -170,17 +171,23 @@ def keep_ledger(
     set_: ScenariosValues = None,
     steps: Steps = 60,
     tolerance: Tolerance = 1e-6,
+    enough: Enough = False,
     results: Folder = LOCAL / "ledger",
 ) -> None:
     """Write what each scene models, and what each part of its physics changes in the answer."""
     from strainbench.bench.plan import plan
     from strainbench.scenario.registry import list_scenarios
-    from strainbench.studies.ledger import write_ledger
+    from strainbench.studies.ledger import write_enough, write_ledger
 
     names = scenarios or [entry.name for entry in list_scenarios()]
     cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
+    if enough and len(cells) != 1:
+        raise ValueError(f"--enough: {len(cells)} scenes; one, with one value a setting, is valid")
     with tracking() as track:
-        written = write_ledger(cells, results, track)
+        if enough:
+            written = write_enough(cells[0], results, track)
+        else:
+            written = write_ledger(cells, results, track)
     for file in written:
         say(f"wrote {file}")
 

@@ -109,6 +109,7 @@ FLAGS = {
     "--optimal",
     "--scaled",
     "--small",
+    "--enough",
 }
 
 

@@ -37,6 +37,7 @@ RESIDUALS = (
     "steps, of the reference's the largest. 0 is the constrained step, 1 no part balanced."
 )
 CAPTION = "Filled: projection in the mass norm; hollow: in the norm as printed, without masses."
+LEAST = 1e-5  # of the largest distance: what is nearer is not drawn
 STEPS, TIMES = "step.csv", "times.csv"
 
 
@@ -69,9 +70,18 @@ TIME_COLUMNS = ("scene", "method", "step", "time", "distance_mm")
 
 
 def _times(rows: Sequence[Distance]) -> Iterator[tuple[object, ...]]:
-    for row in rows:
+    """What the chart over time shows: each scene's shortest step."""
+    for row in shortest(rows):
         for k, distance in enumerate(row.over_time, start=1):
             yield row.scene, row.method, row.step, round(k * row.step, 9), round(distance, 5)
+
+
+def shortest(rows: Sequence[Distance]) -> list[Distance]:
+    """The rows of each scene's shortest step."""
+    least: dict[str, float] = {}
+    for row in rows:
+        least[row.scene] = min(row.step, least.get(row.scene, row.step))
+    return [row for row in rows if row.step == least[row.scene]]
 
 
 def as_document(
@@ -162,7 +172,7 @@ def charts(rows: Sequence[Distance], target: Target) -> list[Chart]:
         if len(steps) > 1:
             found.append(_against_steps(scene, steps, methods, target))
         if steps:
-            found.append(_over_time(scene, [row for row in own if row.step == steps[-1]], target))
+            found.append(_over_time(scene, shortest(own), target))
     return found
 
 
@@ -185,8 +195,9 @@ def _against_steps(
         for method, own in methods.items()
     ]
     every = [row.largest_mm for own in methods.values() for row in own.values()]
-    span = (1.2 * steps[0], steps[-1] / 1.2)  # the shorter the step the further right
-    x = Axis("time step", *span, {s: _step(s) for s in steps})
+    rates = [1 / s for s in steps]
+    ticks = {rate: f"{rate:.4g}" for rate in rates}
+    x = Axis("steps a second", rates[0] / 1.2, 1.2 * rates[-1], ticks)
     y = decades("largest distance", every, length_tick)
     title = f"Distance from the constrained motion as the step shrinks: {scene}"
     return Chart("step", title, CAPTION, Curves(title, x, y, curves).spec(target))
@@ -198,7 +209,8 @@ def _over_time(scene: str, rows: Sequence[Distance], target: Target) -> Chart:
         for row in rows
     ]
     last = max(len(row.over_time) * row.step for row in rows)
-    every = [d for row in rows for d in row.over_time if d > 1e-6 * row.largest_mm]
+    floor = LEAST * max(row.largest_mm for row in rows)
+    every = [d for row in rows for d in row.over_time if d > floor]
     x = Axis("time [s]", 0.0, last, even_ticks(0.0, last), log=False)
     y = decades("distance", every, length_tick)
     title = f"Distance from the constrained motion, step {_step(rows[0].step)}: {scene}"
