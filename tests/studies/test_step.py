@@ -9,6 +9,7 @@ import pytest
 from scenarios.swing import Swing
 from strainbench.bench.plan import plan
 from strainbench.cli.studies import as_decimals
+from strainbench.report.charts import Target
 from strainbench.studies.step import measure, tables, write_distances
 from strainbench.studies.step.measure import (
     Distance,
@@ -18,7 +19,7 @@ from strainbench.studies.step.measure import (
     reference_of,
     residuals,
 )
-from strainbench.studies.step.report import distances, order
+from strainbench.studies.step.report import charts, distances, order
 
 
 def cells(scene="swing", solvers=("newton-ipm",), *settings, duration=0.3):
@@ -115,6 +116,18 @@ def test_tables_charts_and_csv_are_written(rows, tmp_path):
     assert np.sort(longest) == pytest.approx(np.sort([r.largest_mm for r in finest]), abs=1e-4)
     assert paths[3].read_text().startswith("<svg")
     assert len(tables(rows)) == 2
+
+
+def test_all_points_are_in_the_chart(rows):
+    against_steps, over_time = charts(rows, Target.PAGE)
+    assert {round(x) for x in drawn(against_steps)} == {30, 60}
+    assert max(drawn(over_time)) == pytest.approx(0.3)
+
+
+def drawn(chart):
+    """x of all points."""
+    layers = (layer["data"]["values"] for layer in chart.spec["layer"])
+    return [value["x"] for values in layers for value in values if "part" in value]
 
 
 @pytest.mark.parametrize(

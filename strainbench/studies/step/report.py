@@ -190,7 +190,9 @@ def _against_steps(
 ) -> Chart:
     curves = [
         _curve(
-            method, next(iter(own.values())), [(s, own[s].largest_mm) for s in sorted(own)[::-1]]
+            method,
+            next(iter(own.values())),
+            [(1 / s, own[s].largest_mm) for s in sorted(own)[::-1]],
         )
         for method, own in methods.items()
     ]
