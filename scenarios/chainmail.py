@@ -52,7 +52,7 @@ class Chainmail(ClothScenario):
 
     name = "chainmail"
     needs = frozenset({"inertia", "gravity", "membrane"})
-    omits = {"bending": "left out by its material: loose links turn freely"}
+    omits = {"bending": "loose links turn freely"}
 
     limit: float = 0.25
     directions: int | str = 18

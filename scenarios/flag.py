@@ -38,7 +38,6 @@ class Flag(ClothScenario):
 
     name = "flag"
     needs = frozenset({"inertia", "gravity", "membrane", "wind"})
-    omits = {"bending": "left out, as hinges fail where the wind collapses triangles"}
 
     norm: str = "mass"
     step: float = 1 / 100

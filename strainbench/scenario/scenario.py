@@ -60,7 +60,7 @@ class Scenario(ABC):
     The first line of the docstring reads "scene (paper)". `needs` names the physics that the
     scene cannot do without; what it does not need is not built. `about` names what the scene waits
     for, if it waits for anything: a run in which that has not happened says so. `omits` says of
-    physics that would move it why it is left out all the same.
+    physics that would move it why what the scene models has none.
 
     Parameters
     ----------

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from statistics import median
 from time import thread_time
 
 import numpy as np
@@ -40,7 +41,7 @@ PARTS = ("inertia", "gravity", "membrane", "bending", "contact", "wind")
 CONTROL = 0.01  # of the tolerance
 EXACT = "clarabel", "newton-ipm"  # another one than the ledger's is the second control
 NEEDED, WRONG, NEGLIGIBLE = "needed", "wrong to leave out", "negligible at this size"
-ELSEWHERE = "no part of it: it has no physics"
+ELSEWHERE, OMITTED = "no part of it: it has no physics", "no part of what it models"
 FLOOR = Contact(10.0, 5e-3, (Floor(-1.0),))
 """Below the reach of all sheets of our scenes: half a metre and their limit from y = 0."""
 AS_IT_IS = "as it is"
@@ -117,7 +118,7 @@ def judged(row: Row, scene: Scenario, part: str, noise: float, run: Run, base: R
     with_it, without = (base, run) if part in scene.needs else (run, base)
     return replace(
         row,
-        time_share=1 - without.seconds / with_it.seconds,
+        time_share=1 - median(without.times) / median(with_it.times),
         added_nonzeros=with_it.nonzeros - without.nonzeros,
         verdict=verdict(row.distance_mm, noise, scene, part),
         note="; ".join(filter(None, [row.note, scene.omits.get(part, "")])),
@@ -130,6 +131,8 @@ def verdict(moved: float, noise: float, scene: Scenario, part: str) -> str:
         return NEGLIGIBLE
     if not scene.needs:
         return ELSEWHERE
+    if part in scene.omits:
+        return OMITTED
     return NEEDED if part in scene.needs else WRONG
 
 
@@ -195,7 +198,7 @@ class Run:
         self.positions: list[FloatArray] = []
         self.kinetic: list[float] = []
         self.iterations, self.failures = 0, 0
-        self.seconds = 0.0  # of a step, this thread's processor time
+        self.times: list[float] = []  # of steps, this thread's processor time [s]
         self.note = ""
 
     def play(self, steps: int) -> Run:
@@ -207,10 +210,11 @@ class Run:
                 self.kinetic.append(report.kinetic_energy)
                 self.iterations += report.newton_iterations
                 self.failures += not report.newton_converged
+                self.times.append(thread_time() - begin)
+                begin = thread_time()
         except StageError as error:  # a failing solver is data here too
             ended = "no answer" if error.who is Who.SOLVER else f"{error.who} ended"
             self.note = f"{ended} in step {self.stage.step}: {error}"
-        self.seconds = (thread_time() - begin) / max(1, len(self.positions))
         return self
 
     def _project(self, target: FloatArray) -> FloatArray:

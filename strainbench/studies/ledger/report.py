@@ -38,8 +38,9 @@ EXPLANATION = (
     "energy the scene's own parts count (so a part left out is counted in both). A part that moves "
     "the cloth by no more than a hundredth of the tolerance does, or another exact solver, is "
     "negligible at this size. What a part costs: it adds no variables, but non-zeros of the "
-    "energy's Hessian, and a share of the processor time of a step with it, the solver's included; "
-    "below 0% a step without it takes longer, as Newton's method or the solver has more to do."
+    "energy's Hessian, and a share of the processor time of a step with it (medians), the "
+    "solver's included; below 0% a step without it takes longer, as Newton's method or the solver "
+    "has more to do."
 )
 
 
