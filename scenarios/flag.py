@@ -24,8 +24,11 @@ class Flag(ClothScenario):
     explicit force, taken at the start of a sub-step, and as weak as the drag that it stands for:
     c step / (mass per area) = 0.1 at the defaults, far below the 2 at which explicit drag blows up.
 
-    No bending is built: with hinges Newton failed on 2 of 60 steps at 20 cells, without on none. It
-    is not negligible: at 10 cells it moves the flag by up to 85 mm in 60 steps (the ledger).
+    No bending is built, which is wrong for the paper's material: Tang et al. use hinges in all
+    cases, and at 10 cells they move this flag by 85 mm in 60 steps (`strainbench ledger flag`). But
+    a hinge's angle has no derivative where a triangle collapses, which limits on stretch alone do
+    not prevent: with hinges Newton's method fails on steps 31 and 38 at 20 cells and throws the
+    flag away, without them on none. The flag is a load on limits, not a prediction of a fabric.
 
     Parameters
     ----------

@@ -108,6 +108,23 @@ def test_the_table_of_results_is_what_the_committed_rows_come_to():
     assert len(table) == 8
 
 
+def test_distances_from_the_constrained_step_are_those_measured():
+    import pandas as pd
+
+    measured = pd.read_csv(ROOT / "results/stability/constrained/shrinking/step.csv")
+    head = "| | 1/30 s | 1/60 s | 1/120 s |"
+    table = README[README.index(head) :].partition("\n\n")[0].splitlines()[2:]
+    norms = {"mass norm": "mass", "as printed": "unweighted"}
+    for line in table:
+        name, *cells = [cell.strip() for cell in line.strip("|").split("|")]
+        solver, norm = name.replace("`", "").split(", ")
+        own = measured[(measured["solver"] == solver) & (measured["norm"] == norms[norm])]
+        for cell, value in zip(cells, own["largest_mm"], strict=True):
+            digits = len(cell.partition(".")[2])
+            assert cell == f"{value:.{digits}f}", line
+    assert len(table) == 5
+
+
 @pytest.mark.parametrize("target", re.findall(r"`make ([a-z-]+)`", README))
 def test_make_targets_exist(target):
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE)

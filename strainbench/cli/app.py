@@ -34,7 +34,7 @@ from strainbench.cli.pictures import draw_polar, render_scene
 from strainbench.cli.report import compare_results, report_results
 from strainbench.cli.run import run_cells
 from strainbench.cli.stability import draw_map
-from strainbench.cli.studies import follow_solvers, keep_ledger, let_duel
+from strainbench.cli.studies import compare_steps, follow_solvers, keep_ledger, let_duel
 from strainbench.escape import terminal
 from strainbench.options import WrongWordError
 from strainbench.progress import SceneWarning
@@ -91,6 +91,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "export": export_frames,
     "testset": make_test_set,
     "ledger": keep_ledger,
+    "step": compare_steps,
     "map": draw_map,
     "explain": explain_cell,
     "render": render_scene,

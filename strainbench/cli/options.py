@@ -57,6 +57,7 @@ SomeSteps = Annotated[
 Duration = Annotated[
     float | None, _seconds("--duration", "of the scene's time a cell, instead of --steps")
 ]
+ComparedSeconds = Annotated[float, _seconds("--duration", "of the scene's time a cell")]
 FrameNumber = Annotated[int, _whole("--frame", "which projection, the first being 1", metavar="K")]
 FrameNumbers = Annotated[
     str,
@@ -115,6 +116,11 @@ ScenariosValues = Annotated[
 SolversValues = Annotated[
     list[str] | None,
     typer.Option("--set", help="KEY=VALUE of the scenario, or SOLVER.KEY=V1,V2"),
+]
+
+Enough = Annotated[
+    bool,
+    typer.Option("--enough", help="of one scene: directions, mesh and step that are enough"),
 ]
 
 # how to run

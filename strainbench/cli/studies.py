@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import sys
 from collections.abc import Sequence
@@ -19,9 +20,12 @@ from strainbench.cli.options import (
     AllSolvers,
     AnyScenarios,
     Checkout,
+    ComparedSeconds,
+    Enough,
     Folder,
     FrameNumbers,
     FramesFolder,
+    ManyValues,
     OneScenario,
     OneSolver,
     ProjectionSeconds,
@@ -134,23 +138,64 @@ def let_duel(
         say(f"wrote {output}")
 
 
+def compare_steps(
+    scenario: OneScenario,
+    solver: Solvers,
+    set_: ManyValues = None,
+    duration: ComparedSeconds = 0.5,
+    tolerance: Tolerance = 1e-6,
+    results: Folder = LOCAL / "step",
+) -> None:
+    """Compare closed loops with the motion whose steps are constrained whole: distances in mm."""
+    from strainbench.bench.machine import fixed_threads
+    from strainbench.bench.plan import plan
+    from strainbench.document.writers import terminal
+    from strainbench.studies.step import measure, tables, write_distances
+
+    words = [as_decimals(word) for word in set_ or []]
+    cells = plan([scenario], solver, words, "simulate", None, [tolerance], None, duration)
+    with fixed_threads(1), tracking() as track:
+        rows = list(track(measure(cells), "playing", len(cells)))
+    command = shlex.join(["strainbench", *sys.argv[1:]])
+    for table in tables(rows):
+        Console(width=max(console.width, 160)).print(terminal(table))
+    for file in write_distances(rows, command, results):
+        say(f"wrote {file}")
+
+
+def as_decimals(word: str) -> str:
+    """KEY=V1,V2 with fractions of whole numbers, such as 1/60, as decimals."""
+    key, equals, values = word.partition("=")
+    return key + equals + re.sub(r"(?<![\w./])(\d+)/([1-9]\d*)(?![\w./])", _decimal, values)
+
+
+def _decimal(fraction: re.Match[str]) -> str:
+    return repr(int(fraction[1]) / int(fraction[2]))
+
+
 def keep_ledger(
     scenarios: AnyScenarios = None,
     solver: OneSolver = DEFAULT_SOLVER,
     set_: ScenariosValues = None,
     steps: Steps = 60,
     tolerance: Tolerance = 1e-6,
+    enough: Enough = False,
     results: Folder = LOCAL / "ledger",
 ) -> None:
     """Write what each scene models, and what each part of its physics changes in the answer."""
     from strainbench.bench.plan import plan
     from strainbench.scenario.registry import list_scenarios
-    from strainbench.studies.ledger import write_ledger
+    from strainbench.studies.ledger import write_enough, write_ledger
 
     names = scenarios or [entry.name for entry in list_scenarios()]
     cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
+    if enough and len(cells) != 1:
+        raise ValueError(f"--enough: {len(cells)} scenes; one, with one value a setting, is valid")
     with tracking() as track:
-        written = write_ledger(cells, results, track)
+        if enough:
+            written = write_enough(cells[0], results, track)
+        else:
+            written = write_ledger(cells, results, track)
     for file in written:
         say(f"wrote {file}")
 

@@ -141,6 +141,7 @@ def euler_bdf2_and_reflect(
     return Motion(x1, (x1 - middle) / h, motion.time + dt, (middle, velocity))
 
 
+CONSTRAINED = "constrained"
 INTEGRATORS: dict[str, Scheme] = {
     "sap": step_and_project,
     "sar": step_and_reflect,
@@ -149,5 +150,10 @@ INTEGRATORS: dict[str, Scheme] = {
     "bar": bdf2_and_reflect,
     "bar-bdf2": partial(bdf2_and_reflect, middle_bdf2=True),
     "bar-stable": euler_bdf2_and_reflect,
+    CONSTRAINED: step_and_project,
 }
-"""Schemes by their names in Tang et al. 2022, Fig. 4, and our variants of them."""
+"""Schemes by their names in Tang et al. 2022, Fig. 4, and our variants of them.
+
+`CONSTRAINED` is a reference: its minimisation keeps within the limits itself
+(`strainbench.physics.constrained`), and its projection, which is to leave its answers as they are,
+only shows them."""

@@ -13,9 +13,10 @@ import numpy as np
 from strainbench.arrays import FloatArray
 from strainbench.physics.body import gravity_of
 from strainbench.physics.cloth import Cloth, Material
+from strainbench.physics.constrained import constrained_step
 from strainbench.physics.energies.contact import Contact
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
-from strainbench.physics.integrators import INTEGRATORS, Motion
+from strainbench.physics.integrators import CONSTRAINED, INTEGRATORS, Motion
 from strainbench.problem.problem import Problem
 from strainbench.scenario.scenario import FEWEST_STEPS, SheetScenario, StepReport
 
@@ -31,7 +32,8 @@ class ClothScenario(SheetScenario):
     Parameters
     ----------
     integrator : sap, sar, bap or bar as in the paper, or sar-projected, bar-bdf2 or bar-stable,
-        our variants of them: `strainbench.physics.integrators`.
+        our variants of them: `strainbench.physics.integrators`. Or constrained: the limits are kept
+        by each step itself, a reference that takes no projection.
     step : time step [s].
     norm : "unweighted" as printed in Eq. 5, or "mass".
     """
@@ -51,6 +53,14 @@ class ClothScenario(SheetScenario):
             raise ValueError(f"integrator is {self.integrator!r}: valid are {valid}")
         if not 0 < self.step < float("inf"):
             raise ValueError(f"step is {self.step}: a number of seconds above 0 is valid")
+
+        if not self.projects and self.directions == "exact":
+            raise ValueError("integrator constrained: directions exact has none; a number has")
+
+    @property
+    def projects(self) -> bool:
+        """See the base class."""
+        return self.integrator != CONSTRAINED
 
     @property
     def first_step(self) -> float:
@@ -110,10 +120,10 @@ class ClothScenario(SheetScenario):
         cloth = self.cloth()
         positions = self.sheet()[2]
         motion = Motion(positions, np.zeros_like(positions), 0.0)
-        scheme = INTEGRATORS[self.integrator]
+        scheme, problem = INTEGRATORS[self.integrator], self.problem()
         _ = cloth.linear_solver  # sparsity and ordering, once a mesh: part of no step
         while True:
-            step = _Step(self, cloth, motion.velocities)
+            step = _Step(self, cloth, problem, motion.velocities)
             motion = scheme(motion, self.step, step.minimise, project)
             yield step.report(motion)
             if "inertia" not in self.needs:
@@ -123,8 +133,11 @@ class ClothScenario(SheetScenario):
 class _Step:
     """The minimisations of one time step, and what they cost."""
 
-    def __init__(self, scene: ClothScenario, cloth: Cloth, velocities: FloatArray) -> None:
+    def __init__(
+        self, scene: ClothScenario, cloth: Cloth, problem: Problem, velocities: FloatArray
+    ) -> None:
         self.scene, self.cloth, self.velocities = scene, cloth, velocities
+        self.problem = problem
         self.settings = NewtonSettings()
         self.seconds, self.pin_work = 0.0, 0.0
         self.newton: list[NewtonReport] = []
@@ -140,14 +153,33 @@ class _Step:
         push = self.scene.force(start, self.velocities, time)
         if push is not None:
             inertial = inertial + step**2 * push / self.cloth.mass[:, None]
-        found, report = minimise_step(self.cloth, first, inertial, step, self.settings)
+        found, limits_force, report = self._minimum(first, inertial, step)
         self.seconds += perf_counter() - begin
         self.newton.append(report)
         if where is not None:
             inertia = self.cloth.mass[:, None] * (found - inertial) / step**2
-            force = (self.cloth.potential(found)[1] + inertia)[pinned]
+            force = (self.cloth.potential(found)[1] + inertia + limits_force)[pinned]
             self.pin_work += float(np.sum(force * (found - start)[pinned]))
         return found
+
+    def _minimum(
+        self, first: FloatArray, inertial: FloatArray, step: float
+    ) -> tuple[FloatArray, FloatArray, NewtonReport]:
+        """Positions, and the gradient of the limits' terms there (n, 3) [N], if they play a part.
+
+        Raises
+        ------
+        ArithmeticError
+            If a constrained step is unsolved: nothing goes on from it.
+        """
+        if self.scene.projects:
+            found, newton = minimise_step(self.cloth, first, inertial, step, self.settings)
+            return found, np.zeros_like(found), newton
+        found, report = constrained_step(self.cloth, self.problem, first, inertial, step)
+        if not report.converged:
+            raise ArithmeticError(f"the constrained step is unsolved: {report.reason}")
+        G = self.problem.G
+        return found, G.T @ (report.multipliers[:, None] * (G @ found)), report
 
     def report(self, motion: Motion) -> StepReport:
         """The step's costs, and energy and momentum after it."""

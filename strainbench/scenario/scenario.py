@@ -59,7 +59,8 @@ class Scenario(ABC):
 
     The first line of the docstring reads "scene (paper)". `needs` names the physics that the
     scene cannot do without; what it does not need is not built. `about` names what the scene waits
-    for, if it waits for anything: a run in which that has not happened says so.
+    for, if it waits for anything: a run in which that has not happened says so. `omits` says of
+    physics that would move it why what the scene models has none.
 
     Parameters
     ----------
@@ -72,6 +73,7 @@ class Scenario(ABC):
     name: ClassVar[str]
     needs: ClassVar[frozenset[str]]
     about: ClassVar[str] = ""
+    omits: ClassVar[Mapping[str, str]] = {}
 
     resolution: int = 20
     limit: float = 0.01
@@ -107,6 +109,11 @@ class Scenario(ABC):
     def notes(self) -> list[str]:
         """What a user should know of this scene, such as odd things in its files; a line each."""
         return []
+
+    @property
+    def projects(self) -> bool:
+        """Whether candidates are to be projected; where not, the solver "none" alone fits."""
+        return True
 
     @property
     def first_step(self) -> float:

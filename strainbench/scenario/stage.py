@@ -30,6 +30,7 @@ from strainbench.scenario.scenario import Scenario, StepReport
 from strainbench.solver.solver import Solution, Solver, run_solver, warm_up
 
 LONGEST_STATUS = 1000  # characters
+UNLIMITED = "none"  # the solver that leaves candidates as they are
 Play = Callable[[Project], Iterator[StepReport]]
 """What `Scenario.play` is."""
 
@@ -133,6 +134,8 @@ class Stage:
 
     def refusal(self) -> str | None:
         """Why the solver does not take the scene, or None."""
+        if not self.scenario.projects and self.solver.name != UNLIMITED:
+            return f"it takes no projection; the solver {UNLIMITED} alone is valid"
         with blamed(Who.SOLVER):
             return self.solver.supports(self.problem)
 

@@ -31,6 +31,7 @@ VERBS = {
     "converge": ["swing", "--solver", "clarabel", *SMALL, "--frame", "1"],
     "duel": ["swing", *SOLVER, *SMALL, "--frame", "1"],
     "ledger": ["swing", *SMALL, "--steps", "1"],
+    "step": ["swing", *SOLVER, *SMALL],
     "map": ["swing", "--solver", "none", "--x", "limit=1%,2%", "--y", "step=0.01,0.02"],
     "profile": ["swing", *SOLVER, *SMALL, "--frame", "1"],
     "check": ["none"],
@@ -109,6 +110,7 @@ FLAGS = {
     "--optimal",
     "--scaled",
     "--small",
+    "--enough",
 }
 
 

@@ -77,7 +77,7 @@ def test_printed_sar_leaves_a_velocity_at_rest():
 def test_projections_a_step(name):
     seen = []
     list(islice(Swing(resolution=3, integrator=name).play(lambda x: seen.append(x) or x), 4))
-    per_step = {"sap": 1, "bap": 1}.get(name, 2)
+    per_step = {"sap": 1, "bap": 1, "constrained": 1}.get(name, 2)
     assert len(seen) == 4 * per_step
 
 
@@ -128,6 +128,23 @@ def test_pins_go_where_the_scene_has_them_and_their_work_is_counted():
     assert sum(r.pin_work for r in reports) > 0
     still = replace(Swing(resolution=4), step=1 / 30)
     assert sum(r.pin_work for r in islice(still.play(lambda x: x), 5)) == 0
+
+
+def test_constrained_steps_do_the_same_with_pins_and_keep_within_the_limits():
+    scene = Lifted(resolution=4, integrator="constrained", step=1 / 30)
+    seen = []
+    reports = list(islice(scene.play(lambda x: seen.append(x) or x), 30))
+    assert seen[-1][scene.sheet()[3], 1] == pytest.approx(0.2)
+    assert scene.problem().violations(seen[-1]).max() < 1e-7
+    energies = [r.kinetic_energy + r.gravity_energy + r.membrane_energy for r in reports]
+    work = np.cumsum([r.pin_work for r in reports])
+    assert np.all(np.array(energies) < work + 1e-6)  # [J]; what pins do is all that comes in
+    assert work[-1] > 0
+
+
+def test_constrained_steps_need_sampled_directions():
+    with pytest.raises(ValueError, match="integrator constrained: directions exact has none"):
+        Swing(integrator="constrained", directions="exact")
 
 
 def test_a_scheme_that_is_not_there_is_named():

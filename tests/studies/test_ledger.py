@@ -9,11 +9,17 @@ from strainbench.bench.plan import plan
 from strainbench.solver.registry import find_solver
 from strainbench.studies.ledger.measure import (
     AS_IT_IS,
+    ELSEWHERE,
+    NEEDED,
+    NEGLIGIBLE,
+    OMITTED,
     PARTS,
+    WRONG,
     Added,
     Run,
     account,
     compared,
+    verdict,
 )
 from strainbench.studies.ledger.report import write_ledger
 
@@ -33,8 +39,8 @@ def swing():
 
 
 def test_every_part_has_a_row(swing):
-    assert list(swing)[:2] == [AS_IT_IS, "tolerance / 100"]
-    assert [change.split()[-1] for change in list(swing)[2:]] == list(PARTS)
+    assert list(swing)[:3] == [AS_IT_IS, "tolerance / 100", "solver newton-ipm"]
+    assert [change.split()[-1] for change in list(swing)[3:]] == list(PARTS)
 
 
 def test_the_scene_as_it_is_changes_nothing(swing):
@@ -116,9 +122,38 @@ def test_the_drape_stands_still():
 def test_the_table_is_written(tmp_path):
     paths = write_ledger(cells("stretch-square", steps=1), tmp_path)
     assert [p.name for p in paths] == ["ledger.csv", "ledger.md"]
-    assert paths[0].read_text().count("\n") == 1 + 2 + len(PARTS)
+    assert paths[0].read_text().count("\n") == 1 + 3 + len(PARTS)
     assert "with bending" in paths[1].read_text()
     assert (tmp_path / "machines.json").exists()
+
+
+def test_each_part_has_a_verdict(swing):
+    assert {swing[f"without {p}"].verdict for p in ("inertia", "gravity", "membrane")} == {NEEDED}
+    assert swing["with contact"].verdict == NEGLIGIBLE
+    assert swing["with wind"].verdict == ""
+
+
+def test_what_the_solvers_themselves_differ_by_is_negligible():
+    scene = cells("swing")[0].scenario.scenario()
+    assert verdict(0.1, 0.1, scene, "bending") == NEGLIGIBLE
+    assert verdict(0.2, 0.1, scene, "bending") == NEEDED
+    assert verdict(0.2, 0.1, scene, "wind") == WRONG
+    assert verdict(0.2, 0.1, cells("stretch-square")[0].scenario.scenario(), "gravity") == ELSEWHERE
+
+
+def test_each_part_has_its_cost(swing):
+    bending = swing["without bending"]
+    assert bending.added_nonzeros == swing[AS_IT_IS].hessian_nonzeros - bending.hessian_nonzeros
+    assert bending.added_nonzeros > 0
+    assert swing["without gravity"].added_nonzeros == 0
+    assert all(row.time_share < 1 for row in swing.values() if row.time_share is not None)
+    assert swing[AS_IT_IS].time_share is None
+
+
+def test_bending_that_is_left_out_says_why():
+    chainmail = rows("chainmail", "directions=4", steps=12)["with bending"]
+    assert chainmail.verdict == OMITTED
+    assert chainmail.note == "loose links turn freely"
 
 
 def test_a_solver_that_is_not_there_is_one_line(tmp_path, monkeypatch):

@@ -3,9 +3,12 @@
     strainbench ledger swing flag --set resolution=10 --steps 60 --results results/local/ledger
 
 1. play the scene as it is
-2. play it again with a hundredth of the tolerance: what this control changes is noise
+2. play it again with a hundredth of the tolerance, and with another exact solver: what these two
+   controls change is the solvers' own difference
 3. play it with each part added that it does not need, and with each left out that it needs
-4. compare positions and energy after the last step that both have
+4. compare positions and energy after the last step that both have, and the time of a step
+5. a verdict a part: needed, or wrong to leave out, if it moves the cloth by more than the controls
+   do; else negligible at this size
 
 Left out, inertia means that each step starts at rest. Added, contact is a floor beyond the reach
 of the sheet. A scene without physics gets an implicit Euler step of the added part alone on each
@@ -16,6 +19,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from statistics import median
+from time import thread_time
 
 import numpy as np
 
@@ -29,10 +34,14 @@ from strainbench.referee.reference import reference_of
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.scenario import Scenario, SheetScenario
 from strainbench.scenario.stage import Stage, StageError, Who
+from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solver
 
 PARTS = ("inertia", "gravity", "membrane", "bending", "contact", "wind")
 CONTROL = 0.01  # of the tolerance
+EXACT = "clarabel", "newton-ipm"  # another one than the ledger's is the second control
+NEEDED, WRONG, NEGLIGIBLE = "needed", "wrong to leave out", "negligible at this size"
+ELSEWHERE, OMITTED = "no part of it: it has no physics", "no part of what it models"
 FLOOR = Contact(10.0, 5e-3, (Floor(-1.0),))
 """Below the reach of all sheets of our scenes: half a metre and their limit from y = 0."""
 AS_IT_IS = "as it is"
@@ -63,6 +72,9 @@ class Row:
     distance_edges: float | None = None  # the same in mean edge lengths
     energy_mj: float | None = None  # more than as it is, both counted with the scene's own parts
     note: str = ""
+    time_share: float | None = None  # of a step with the part, in processor time
+    added_nonzeros: int | None = None  # of the energy's Hessian, by the part
+    verdict: str = ""
 
 
 def account(cell: Cell) -> Iterator[Row]:
@@ -71,14 +83,57 @@ def account(cell: Cell) -> Iterator[Row]:
     base = Run(scene, solver, cell.tolerance).play(cell.steps)
     yield compared(AS_IT_IS, base, base)
     control = Run(scene, solver, CONTROL * cell.tolerance)
-    yield compared("tolerance / 100", control.play(cell.steps), base)
+    controls = [compared("tolerance / 100", control.play(cell.steps), base), another(cell, base)]
+    yield from controls
+    noise = max((row.distance_mm for row in controls if row.distance_mm is not None), default=0.0)
     for part in PARTS:
         change = f"without {part}" if part in scene.needs else f"with {part}"
         if reason := meaningless(scene, part):
             yield replace(empty(scene, change), note=reason)
-        else:
-            other = changed(scene, part, solver, cell.tolerance)
-            yield compared(change, other.play(cell.steps), base)
+            continue
+        run = changed(scene, part, solver, cell.tolerance).play(cell.steps)
+        yield judged(compared(change, run, base), scene, part, noise, run, base)
+
+
+def another(cell: Cell, base: Run) -> Row:
+    """The scene as it is, solved by another exact solver than the cell's."""
+    name = next(name for name in EXACT if name != cell.solver.name)
+    try:
+        run = Run(base.scene, find_solver(name), cell.tolerance)
+    except StageError as error:
+        return replace(empty(base.scene, f"solver {name}"), note=str(error))
+    return compared(f"solver {name}", run.play(cell.steps), base)
+
+
+def judged(row: Row, scene: Scenario, part: str, noise: float, run: Run, base: Run) -> Row:
+    """A part's row with what it costs and whether the scene can do without it.
+
+    Parameters
+    ----------
+    noise : what the solvers' own differences move [mm]
+    run, base : the scene changed, and as it is
+    """
+    if row.distance_mm is None:
+        return row
+    with_it, without = (base, run) if part in scene.needs else (run, base)
+    return replace(
+        row,
+        time_share=1 - median(without.times) / median(with_it.times),
+        added_nonzeros=with_it.nonzeros - without.nonzeros,
+        verdict=verdict(row.distance_mm, noise, scene, part),
+        note="; ".join(filter(None, [row.note, scene.omits.get(part, "")])),
+    )
+
+
+def verdict(moved: float, noise: float, scene: Scenario, part: str) -> str:
+    """Whether a scene can do without a part that moves it by so much; both in mm."""
+    if moved <= noise:
+        return NEGLIGIBLE
+    if not scene.needs:
+        return ELSEWHERE
+    if part in scene.omits:
+        return OMITTED
+    return NEEDED if part in scene.needs else WRONG
 
 
 def meaningless(scene: Scenario, part: str) -> str:
@@ -143,16 +198,20 @@ class Run:
         self.positions: list[FloatArray] = []
         self.kinetic: list[float] = []
         self.iterations, self.failures = 0, 0
+        self.times: list[float] = []  # of steps, this thread's processor time [s]
         self.note = ""
 
     def play(self, steps: int) -> Run:
         """So many steps, or as many as have an answer; the run itself."""
+        begin = thread_time()
         try:
             for report in self.stage.steps(steps, self._project):
                 self.positions.append(self.stage.positions)
                 self.kinetic.append(report.kinetic_energy)
                 self.iterations += report.newton_iterations
                 self.failures += not report.newton_converged
+                self.times.append(thread_time() - begin)
+                begin = thread_time()
         except StageError as error:  # a failing solver is data here too
             ended = "no answer" if error.who is Who.SOLVER else f"{error.who} ended"
             self.note = f"{ended} in step {self.stage.step}: {error}"
@@ -172,6 +231,11 @@ class Run:
         if make:
             return make()
         return self.added.cloth if self.added else None
+
+    @property
+    def nonzeros(self) -> int:
+        """Of the energies' Hessian, in the lower triangle."""
+        return len(self.cloth.pattern.indices) if self.cloth else 0
 
 
 def energy(run: Run, base: Run, step: int) -> float | None:
@@ -196,7 +260,7 @@ def compared(change: str, run: Run, base: Run) -> Row:
         variables=3 * len(problem.free),
         constraints=problem.constraints,
         nonzeros=3 * problem.G.nnz,
-        hessian_nonzeros=len(cloth.pattern.indices) if cloth else None,
+        hessian_nonzeros=run.nonzeros if cloth else None,
         newton_iterations=run.iterations + (added.iterations if added else 0),
         newton_failures=run.failures + (added.failures if added else 0),
         note=run.note,
