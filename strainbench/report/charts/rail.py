@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from typing import Any, NamedTuple
-
-import pandas as pd
 
 from strainbench.report.charts.canvas import Plane
 from strainbench.report.charts.target import Target
@@ -16,7 +14,7 @@ GROUND, INK = "#FBEDEA", "#A8281B"
 ROW = 1.35  # of a line, in its size
 
 
-def why_failed(run: pd.Series) -> str:
+def why_failed(run: Mapping[Hashable, Any]) -> str:
     """Why a cell does not count, beside its name."""
     if run["ending"] == VIOLATED:
         return str(run["why"]).removeprefix("violates ")

@@ -15,10 +15,12 @@ from strainbench.document.html import templates
 from strainbench.escape import plain
 from strainbench.progress import Track, untracked
 from strainbench.report.identity import look
-from strainbench.report.measures import OPTIMAL, measured, numbers
+from strainbench.report.measures import OPTIMAL, numbers
 from strainbench.report.names import percent
 from strainbench.report.page import data
+from strainbench.report.page.drawn import Drawn, Speed
 from strainbench.report.page.headline import headline
+from strainbench.report.page.maps import map_of
 from strainbench.report.page.races import CASE, with_cases
 from strainbench.report.page.sections import Section, sections
 from strainbench.report.page.tiles import tiles
@@ -44,6 +46,7 @@ def report_page(
     failed: pd.DataFrame,
     machines: Machines,
     files: Sequence[str],
+    speed: Speed,
     track: Track = untracked,
 ) -> str:
     """The page of a results folder.
@@ -53,11 +56,13 @@ def report_page(
     runs : as `strainbench.report.load_runs` has them
     failed : as `strainbench.report.failures.failures` has it
     files : names of what else was written, to be linked
+    speed : makes the charts of time against an accuracy
     """
     steps = newest_steps(folder, runs)
     steps = numbers(steps[[name for name in READ if name in steps]])
-    found = with_cases(measured(runs, steps))
-    parts = sections(folder, found, steps, failed, machines, track)
+    found = with_cases(runs)
+    mapped = map_of(folder, runs)
+    parts = sections(folder, found, steps, failed, machines, speed, bool(mapped), track)
     page: str = _template().render(
         title=folder.resolve().name,
         meta=_meta(found),
@@ -73,11 +78,12 @@ def report_page(
         script=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)),
         packed=data.packed(
             {
-                "specs": {chart.name: chart.specs for part in parts for chart in part.charts},
                 "records": data.records(found),
+                "map": mapped,
                 "steps": data.step_lists(steps),
             }
         ),
+        specs=_specs(chart for part in parts for chart in part.charts),
         records=Markup(data.as_json(_payload(folder, found, steps, failed, parts))),
     )
     return page
@@ -110,6 +116,15 @@ def _payload(
         "grid": bool(runs["mesh"].str.contains("×").all()),
         "charts": {chart.name: chart.about for part in parts for chart in part.charts},
     }
+
+
+def _specs(charts: Iterable[Drawn]) -> dict[str, str]:
+    """Packed, those apart that a page needs at different times: by target and accuracy."""
+    packs: dict[str, dict[str, object]] = {}
+    for chart in charts:
+        for target, spec in chart.specs.items():
+            packs.setdefault(f"{target}-{chart.about.get('against', '')}", {})[chart.name] = spec
+    return {name: data.packed(specs) for name, specs in packs.items()}
 
 
 def _blocks(runs: pd.DataFrame) -> list[list[str]]:

@@ -112,6 +112,7 @@ async function begin() {
   links();
   askSelects();
   drawMatrix();
+  drawMaps();
   refresh();
   if (state.cell) openDrawer(state.cell);
 }

@@ -11,6 +11,7 @@ const WORDS = {
   "out of time": "out of time",
   "no answer": "no answer",
 };
+const SIGNS = { optimal: "✓", feasible: "○", violated: "✗", "out of time": "✗", "no answer": "✗" };
 const counts = (cell) => cell.ending === "optimal" || cell.ending === "feasible";
 
 function el(tag, attributes = {}, ...children) {
