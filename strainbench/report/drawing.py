@@ -14,6 +14,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 from xml.etree import ElementTree
 
@@ -65,18 +66,17 @@ def drawn_beside(sheets: Sequence[Sheet]) -> Iterator[None]:
     program = [sys.executable, "-P", __file__]
     where = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     sent = "".join(json.dumps(vars(sheet)) + "\n" for sheet in sheets)
-    pipe = subprocess.PIPE
-    with subprocess.Popen(program, env=where, stdin=pipe, stderr=pipe) as process:
-        assert process.stdin is not None
-        process.stdin.write(sent.encode())
-        process.stdin.close()
-        process.stdin = None  # what is closed is not to be flushed
-        try:
-            yield
-        except BaseException:
-            process.kill()
-            raise
+    with TemporaryFile() as given:
+        given.write(sent.encode())
+        given.seek(0)
+        process = subprocess.Popen(program, env=where, stdin=given, stderr=subprocess.PIPE)
+    try:
+        yield
         _, said = process.communicate()
+    except BaseException:
+        process.kill()
+        process.wait()
+        raise
     if process.returncode:
         raise OSError(f"charts were not drawn: {said.decode(errors='replace').strip()}")
 

@@ -5,10 +5,10 @@ Rows are those of `strainbench.report.load_runs` and `strainbench.report.steps.n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import floor, inf, isfinite, log10, nan
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,6 +16,7 @@ import pandas as pd
 from strainbench.bench.columns import STEP_COLUMNS, WORDS
 from strainbench.bench.ending import Ending
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row
 
 OPTIMAL, FEASIBLE, VIOLATED = "optimal", "feasible", "violated"
 OUT_OF_TIME, NO_ANSWER = "out of time", "no answer"
@@ -108,7 +109,7 @@ def by_clock(status: str) -> bool:
     return any(words in status.lower() for words in CLOCK)
 
 
-def finish(run: Mapping[Any, Any], steps: pd.DataFrame) -> Finish:
+def finish(run: Row, steps: pd.DataFrame) -> Finish:
     """How a cell ended; a projection that the clock cut off is no violation.
 
     Parameters
@@ -155,7 +156,7 @@ def measured(runs: pd.DataFrame, steps: pd.DataFrame) -> pd.DataFrame:
     return runs.assign(**pd.DataFrame(rows, columns=list(NEW), index=runs.index))
 
 
-def _measures(run: Mapping[Any, Any], steps: pd.DataFrame) -> tuple[object, ...]:
+def _measures(run: Row, steps: pd.DataFrame) -> tuple[object, ...]:
     """The entries of NEW."""
     end, time = finish(run, steps), timing(steps)
     if steps.empty:
@@ -204,7 +205,7 @@ def seconds_text(seconds: float) -> str:
     return digits(seconds) if isfinite(seconds) else ""
 
 
-def distance_of(row: pd.Series) -> str:
+def distance_of(row: Row) -> str:
     """A cell's largest distance in mm; nothing where it or the reference's error is unknown."""
     mm, error = 1000 * row["distance_max"], 1000 * row["reference_error_max"]
     return distance_text(mm, error) if isfinite(mm) and error != inf else ""

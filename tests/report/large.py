@@ -1,12 +1,17 @@
-"""Results folders of any size, multiplied from the committed rows over a setting: `python -m
-tests.report.large DIR 2000` writes one, and reports it."""
+"""Results folders of any size, multiplied from the committed rows over a setting.
+
+`python -m tests.report.large DIR 100 1000 2000` writes them, reports them, and says how the time
+grows.
+"""
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
-from itertools import count, islice
+from itertools import count, islice, pairwise
+from math import log
 from pathlib import Path
 
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
@@ -47,10 +52,21 @@ def _rows():
         yield from ((*each, copy) for each in found)
 
 
+def report(folder: Path, cells: int) -> float:
+    """Seconds of CPU for its report, with what is drawn beside; what it took is printed."""
+    multiply(folder, cells)
+    wall, before = time.perf_counter(), os.times()
+    write_report(folder)
+    wall, after = time.perf_counter() - wall, os.times()
+    cpu = sum(after[:4]) - sum(before[:4])
+    size = (folder / "index.html").stat().st_size / 1e6
+    print(f"{cells} cells: {wall:.1f} s, {cpu:.1f} s of CPU, page {size:.2f} MB", flush=True)
+    return cpu
+
+
 if __name__ == "__main__":
-    multiply(Path(sys.argv[1]), int(sys.argv[2]))
-    wall, cpu = time.perf_counter(), time.process_time()
-    write_report(Path(sys.argv[1]))
-    size = (Path(sys.argv[1]) / "index.html").stat().st_size / 1e6
-    wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
-    print(f"{sys.argv[2]} cells: {wall:.1f} s, {cpu:.1f} s of CPU, page {size:.2f} MB")
+    times = {}
+    for word in sys.argv[2:]:
+        times[int(word)] = report(Path(sys.argv[1]) / word, int(word))
+    for (few, before), (many, after) in pairwise(times.items()):
+        print(f"from {few} to {many}: exponent {log(after / before) / log(many / few):.2f}")

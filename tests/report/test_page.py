@@ -382,3 +382,18 @@ def test_a_map_is_drawn_where_it_was_run(browser, tmp_path):
     shown.run("document.querySelector('.map .square').click()")
     assert "violates the limits" in shown.run("byId('drawer').innerText")
     shown.close()
+
+
+def test_all_of_many_cases_are_drawn_when_they_come_into_view(browser, tmp_path):
+    many = 30
+    rows = [row("admm", cell=str(k), scenario_parameters=f'{{"step": {k}.5}}') for k in range(many)]
+    shown = browser.open(report_of(tmp_path, *rows), hash_="#scene=*")
+    shown.until("document.body.dataset.drawn !== undefined")
+    figures = "[...document.querySelectorAll('#speed figure.chart:not([hidden])')]"
+    assert shown.run(f"{figures}.length") == many
+    last = f"{figures}.at(-1)"
+    assert not shown.run(f"{last}.classList.contains('drawn')")
+    shown.run(f"{last}.scrollIntoView()")
+    shown.until(f"{last}.querySelector('svg') && {last}.classList.contains('drawn')")
+    assert shown.faults() == []
+    shown.close()

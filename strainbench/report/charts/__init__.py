@@ -33,7 +33,7 @@ __all__ = [
     "work_precision",
 ]
 ENDINGS = (".svg", ".png")
-MOST = 20  # charts of a kind in files: each takes a third of a second
+MOST = 8  # charts of a kind in files: each takes a third of a second
 
 
 def chart_sheets(

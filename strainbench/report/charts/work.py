@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import isfinite
@@ -20,6 +20,7 @@ from strainbench.report.charts.text import Box, Name, Placed, place
 from strainbench.report.measures import COUNT, OPTIMAL, duration, length
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits_of
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.table import UNCONSTRAINED
 
 FIGURE = ["scenario", "mode", "exact", "steps_asked", "threads"]
@@ -31,8 +32,6 @@ USED = [
     *("distance_bound_max", "max_violation", "reference_error_max"),
 ]
 HEAD = "violates the limits (by), or out of time (steps done):"
-Record = Mapping[Hashable, Any]
-"""A row of USED, with its accuracy and its label."""
 FLOOR = 1e-9
 """Less, in mm or relative, is drawn at the lower edge, with an arrow and its value."""
 
@@ -113,7 +112,7 @@ def labels(runs: pd.DataFrame) -> list[str]:
 class Panel:
     """The cells of one mesh and limit, as records; `rail` is that of all panels beside it."""
 
-    runs: Sequence[Record]
+    runs: Sequence[Row]
     target: Target
     accuracy: Accuracy
     x: Axis
@@ -127,7 +126,7 @@ class Panel:
         return ", ".join(filter(None, (run["scenario"], cells(run["mesh"]), limit, run["label"])))
 
     @cached_property
-    def counted(self) -> list[Record]:
+    def counted(self) -> list[Row]:
         """Cells with a point, those that did not know their accuracy left out."""
         kept = [run for run in self.runs if run["ending"] in COUNT]
         return [run for run in kept if run["time"] == run["time"] and isfinite(run["accuracy"])]
@@ -135,7 +134,7 @@ class Panel:
     @cached_property
     def failures(self) -> list[dict[str, Any]]:
         """What stands in the rail: each method that failed, where it did, why."""
-        failed: dict[str, list[Record]] = {}
+        failed: dict[str, list[Row]] = {}
         for run in self.runs:
             if run["ending"] not in COUNT:
                 failed.setdefault(run["solver"], []).append(run)
@@ -219,13 +218,13 @@ TOOLTIP = [
 ]
 
 
-def _why(run: Record, several: bool) -> str:
+def _why(run: Row, several: bool) -> str:
     """In the rail, beside the name."""
     why = why_failed(run)
     return f"at {run['tolerance']:g} {why}" if several else why
 
 
-def _point(run: Record, accuracy: Accuracy, lowest: float) -> dict[str, Any]:
+def _point(run: Row, accuracy: Accuracy, lowest: float) -> dict[str, Any]:
     """A cell's point, with all that hovering shows."""
     found = about(run["solver"])
     value = float(run["accuracy"])
@@ -293,6 +292,7 @@ def _panels(figure: pd.DataFrame, target: Target, accuracy: Accuracy) -> list[Pa
     if accuracy.scale != 1.0:
         values += [1000 * v for v in figure["reference_error_max"] if v > 0]
     y = decades(accuracy.title, values, tick, int(target.sizes.height / 2.2 / target.sizes.text))
-    ordered = figure.sort_values(["limit", "resolution", "mesh"], kind="stable")
-    groups = ordered.groupby(PANEL, sort=False, dropna=False)
-    return [Panel(rows.to_dict("records"), target, accuracy, x, y) for _, rows in groups]
+    groups: dict[tuple[object, ...], list[Row]] = {}
+    for row in rows_of(figure.sort_values(["limit", "resolution", "mesh"], kind="stable")):
+        groups.setdefault(tuple(row[name] for name in PANEL), []).append(row)
+    return [Panel(rows, target, accuracy, x, y) for rows in groups.values()]

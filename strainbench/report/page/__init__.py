@@ -25,6 +25,7 @@ from strainbench.report.page.races import CASE, with_cases
 from strainbench.report.page.sections import Section, sections
 from strainbench.report.page.tiles import tiles
 from strainbench.report.page.vega import vega_script
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
 
@@ -138,7 +139,7 @@ def _meta(runs: pd.DataFrame) -> str:
     """What all cells share, in a line."""
     parts = [
         *_few(runs["scene"], "{} scenes"),
-        *_few([_steps(row) for _, row in runs.iterrows()], ""),
+        *_few([_steps(row) for row in rows_of(runs)], ""),
         *_few([f"limit {percent(v)}" if v == v else "" for v in runs["limit"]], "{} limits"),
         *_few([f"directions {v}" if v else "" for v in runs["directions"].astype(str)], ""),
         *_few(runs["aim"], "{} tolerances"),
@@ -149,7 +150,7 @@ def _meta(runs: pd.DataFrame) -> str:
     return " · ".join(filter(None, parts))
 
 
-def _steps(row: pd.Series) -> str:
+def _steps(row: Row) -> str:
     said = {"replay": "replayed frames 1 to", "simulate": "simulated steps 1 to"}
     return f"{said.get(row['mode'], row['mode'])} {row['steps_asked']:.0f}"
 

@@ -16,6 +16,7 @@ from strainbench.escape import plain
 from strainbench.report.identity import LOOKS, Family, look
 from strainbench.report.measures import SIGNS, distance_text, projections
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row, rows_of
 
 KEPT = 5  # significant digits of a step's numbers
 STEP = ("step", "seconds", "max_violation", "relative_gap", "distance")
@@ -58,10 +59,10 @@ def packed(value: object) -> str:
 def cells(runs: pd.DataFrame, steps: pd.DataFrame) -> list[dict[str, object]]:
     """A record a cell, with what the page says of it in words and the share that is optimal."""
     shares = _optimal(steps)
-    return [_cell(row, shares.get(row["cell"], 0)) for _, row in runs.iterrows()]
+    return [_cell(row, shares.get(row["cell"], 0)) for row in rows_of(runs)]
 
 
-def _cell(row: pd.Series, optimal: int) -> dict[str, object]:
+def _cell(row: Row, optimal: int) -> dict[str, object]:
     distance, error = 1000 * row["distance_max"], 1000 * row["reference_error_max"]
     asked = row["steps_asked"] * max(1, row["projections"] / max(row["steps_done"], 1))
     found = {name: _value(row[column]) for name, column in CELL.items()}
