@@ -123,7 +123,7 @@ def test_every_entry_of_a_row_is_in_its_record(page, field):
 
 
 UNITS = {"s": 1, "ms": 1e-3, "µs": 1e-6, "m": 1e3, "cm": 10, "mm": 1, "µm": 1e-3, "nm": 1e-6}
-TWO_DIGITS, POWER = 0.06, 0.5  # relative
+TWO_DIGITS, POWER, DRAWN_TO = 0.06, 0.5, 1e-4  # relative
 
 
 def expected_of(field):
@@ -180,9 +180,9 @@ def in_charts(page, expected):
         assert points
         for point in points:
             right, where = expected[point["cell"]], (name, point["cell"])
-            yield where, point["seconds"], right["time"], 1e-9
-            yield where, point["high"], right["high"], 1e-9
-            yield where, point["value"], right["mm"], 1e-9
+            yield where, point["seconds"], right["time"], DRAWN_TO
+            yield where, point["high"], right["high"], DRAWN_TO
+            yield where, point["value"], right["mm"], DRAWN_TO
             yield where, with_unit(point["time"]), right["time"], TWO_DIGITS
             low, high = map(with_unit, point["quartiles"].split(" to "))
             yield where, low, right["low"], TWO_DIGITS

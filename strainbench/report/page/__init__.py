@@ -79,13 +79,15 @@ def report_page(
         script=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)),
         packed=data.packed(
             {
+                "cells": data.cells(found, steps),
+                "failures": data.failed_lists(failed, found),
                 "records": data.records(found),
                 "map": mapped,
                 "steps": data.step_lists(steps),
             }
         ),
         specs=_specs(chart for part in parts for chart in part.charts),
-        records=Markup(data.as_json(_payload(folder, found, steps, failed, parts))),
+        records=Markup(data.as_json(_payload(folder, found, parts))),
     )
     return page
 
@@ -93,8 +95,6 @@ def report_page(
 def _payload(
     folder: Path,
     runs: pd.DataFrame,
-    steps: pd.DataFrame,
-    failed: pd.DataFrame,
     parts: Iterable[Section],
 ) -> dict[str, object]:
     """What the script reads."""
@@ -104,8 +104,6 @@ def _payload(
     return {
         "folder": plain(folder),
         "alone": UNCONSTRAINED,
-        "cells": data.cells(runs, steps),
-        "failures": data.failed_lists(failed, runs),
         "methods": {name: data.looks(name) for name in methods},
         "families": data.families(methods),
         "blocks": _blocks(runs),
@@ -125,7 +123,7 @@ def _specs(charts: Iterable[Drawn]) -> dict[str, str]:
     for chart in charts:
         for target, spec in chart.specs.items():
             packs.setdefault(f"{target}-{chart.about.get('against', '')}", {})[chart.name] = spec
-    return {name: data.packed(specs) for name, specs in packs.items()}
+    return {name: data.packed(specs, data.DRAWN) for name, specs in packs.items()}
 
 
 def _blocks(runs: pd.DataFrame) -> list[list[str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import re
 from collections.abc import Iterable, Sequence
 from math import isfinite, isnan
 from typing import Any
@@ -19,6 +20,7 @@ from strainbench.report.numbers import power
 from strainbench.report.rows import Row, rows_of
 
 KEPT = 5  # significant digits of a step's numbers
+DRAWN = 5  # digits of a fraction in a chart
 STEP = ("step", "seconds", "max_violation", "relative_gap", "distance")
 """Numbers of a step that are shown; what it says comes last."""
 CELL = {
@@ -50,9 +52,11 @@ def as_json(value: object) -> str:
     return text.replace("<", r"\u003c")
 
 
-def packed(value: object) -> str:
-    """As JSON, but a tenth as long: gzip in base64."""
+def packed(value: object, most: int | None = None) -> str:
+    """As JSON, but a tenth as long: gzip in base64; of fractions at most so many digits."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    if most:
+        text = re.sub(rf"(\d\.0*(?!0)\d{{{most}}})\d+", r"\1", text)
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
