@@ -11,6 +11,7 @@ import pandas as pd
 from strainbench.arrays import FloatArray
 from strainbench.document import Column, Prose, Table
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits, settings
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
 
@@ -40,14 +41,14 @@ def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     Columns: cell, panel and curve (what tells its panel and its curve from others), time [s],
     energy [J].
     """
-    steps = newest_steps(folder, runs).copy()
+    simulated = runs[runs["mode"] == "simulate"]
+    steps = newest_steps(folder, simulated)[["cell", "step", "time", *PARTS]].copy()
     for column in ("step", "time", *PARTS):
         steps[column] = pd.to_numeric(steps[column].replace("nan", ""))
     steps = steps.dropna(subset=["time", "kinetic_energy"]).drop_duplicates(
         ["cell", "step"], keep="last"
     )
-    names = _names(runs[runs["mode"] == "simulate"])
-    steps = steps[steps["cell"].isin(names.index)]
+    names = _names(simulated)
     steps = steps.assign(order=steps["cell"].map({c: k for k, c in enumerate(names.index)}))
     steps = steps.sort_values(["order", "step"]).join(names, on="cell")
     steps["energy"] = steps[PARTS].sum(axis=1)
@@ -60,25 +61,24 @@ def _names(runs: pd.DataFrame) -> pd.DataFrame:
     settings_apart = apart(runs, IN_NAMES)
     names = [
         {"cell": row["cell"], "panel": _panel(row), "curve": _curve(row, precision, others)}
-        for (_, row), others in zip(runs.iterrows(), settings_apart, strict=True)
+        for row, others in zip(rows_of(runs), settings_apart, strict=True)
     ]
     table = pd.DataFrame(names, columns=["cell", "panel", "curve"])
     alike = table.duplicated(["panel", "curve"], keep=False).to_numpy()
     more = [
-        f", {row['steps_asked']:.0f} steps, tolerance {row['tolerance']:g}"
-        for _, row in runs.iterrows()
+        f", {row['steps_asked']:.0f} steps, tolerance {row['tolerance']:g}" for row in rows_of(runs)
     ]
     table["curve"] += np.where(alike, more, "").astype(object)
-    table["curve"] += [ended(row) for _, row in runs.iterrows()]
+    table["curve"] += [ended(row) for row in rows_of(runs)]
     return table.set_index("cell")
 
 
-def _panel(row: pd.Series) -> str:
+def _panel(row: Row) -> str:
     limit = f"{row['bound']} limit" if row["bound"] else ""
     return ", ".join(filter(None, (row["scenario"], cells(row["mesh"]), limit)))
 
 
-def _curve(row: pd.Series, precision: Mapping[str, int], others: str) -> str:
+def _curve(row: Row, precision: Mapping[str, int], others: str) -> str:
     alone = row["solver"] == UNCONSTRAINED
     scheme = "IE" if alone and row["integrator"] == "sap" else row["integrator"].upper()
     step = settings(row["scenario_parameters"]).get("step")
@@ -89,7 +89,7 @@ def _curve(row: pd.Series, precision: Mapping[str, int], others: str) -> str:
     )
 
 
-def ended(row: pd.Series) -> str:
+def ended(row: Row) -> str:
     """That a run ended early, and when; such a curve ends in a cross."""
     early = row["steps_done"] < row["steps_asked"]
     return f", {ENDED} {row['steps_done']:.0f} of {row['steps_asked']:.0f} steps" if early else ""

@@ -20,6 +20,7 @@ from strainbench.referee.certificate import OUTCOMES
 from strainbench.report.machine import machine_section
 from strainbench.report.measures import OUT_OF_TIME, distance_of
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
 from strainbench.scenario.registry import find_scenario
@@ -161,22 +162,22 @@ def failures_document(
 ) -> Document:
     """Methods against cases, what the signs mean, a line for each failure, the machine."""
     cases, methods = list(dict.fromkeys(table["case"])), list(dict.fromkeys(table["method"]))
-    cells = {(r["case"], r["method"]): _cell(r) for _, r in table.iterrows()}
+    cells = {(r["case"], r["method"]): _cell(r) for r in rows_of(table)}
     lines = [[m, *(cells.get((c, m), "") for c in cases)] for m in methods]
     first = runs.iloc[0]
     about = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
     failed = [
-        Document(str(case), [Items([_failure(r) for _, r in rows.iterrows()])])
+        Document(str(case), [Items([_failure(r) for r in rows_of(rows)])])
         for case, rows in table[table["sign"] != PASSED].groupby("case", sort=False)
     ]
     grid = Table("", ["method", *cases], lines, Prose(about))
     return Document("Where methods fail", [grid, *failed, machine_section(machines)])
 
 
-def _failure(row: pd.Series) -> str:
+def _failure(row: Row) -> str:
     return f"{row['method']}: {row['found']}; {row['verdict']}. In full: {row['reason']}"
 
 
-def _cell(row: pd.Series) -> str:
+def _cell(row: Row) -> str:
     shared = " †" if " too: " in row["verdict"] else ""
     return f"{row['sign']} {row['found']}".strip() + shared

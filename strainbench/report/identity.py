@@ -10,6 +10,7 @@ import colorsys
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import cached_property, lru_cache
 from math import cos, pi, sin
 
 
@@ -43,7 +44,7 @@ class Look:
     shape: str
     dash: tuple[float, ...] = ()
 
-    @property
+    @cached_property
     def ink(self) -> str:
         """The colour dark enough for text on white."""
         rgb = _rgb(self.colour)
@@ -147,6 +148,7 @@ VARIANTS = {
 YOURS = Look(Family.YOURS, "", "#D0021B", STAR)
 
 
+@lru_cache(maxsize=1024)
 def look(name: str) -> Look:
     """Of a method, a variant of one (clarabel-tight, admm[rho=2]), or one of the user's."""
     if name in LOOKS:

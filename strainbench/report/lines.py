@@ -20,6 +20,7 @@ from strainbench.report.measures import (
     seconds_text,
 )
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row, rows_of
 
 MEASURES: tuple[str | Column, ...] = (
     "outcome",
@@ -39,28 +40,28 @@ def ranked(cells: pd.DataFrame) -> pd.DataFrame:
     return cells.iloc[np.lexsort((times, order))]
 
 
-def marked(cells: pd.DataFrame) -> Iterator[tuple[pd.Series, list[str]]]:
+def marked(cells: pd.DataFrame) -> Iterator[tuple[Row, list[str]]]:
     """Ranked cells, with their method and MEASURES; the fastest stands out, if it is optimal."""
-    for place, (_, row) in enumerate(cells.iterrows()):
+    for place, row in enumerate(rows_of(cells)):
         method, (ending, time, *others) = row["solver"], measures_of(row)
         if place == 0 and row["ending"] == OPTIMAL:
             method, time = Strong(method), Strong(time)
         yield row, [method, ending, time, *others]
 
 
-def measures_of(row: pd.Series) -> list[str]:
+def measures_of(row: Row) -> list[str]:
     """The entries of MEASURES; numbers that do not count are faint."""
     texts = [*time_of(row), milliseconds(row["solve_seconds_mean"]), *accuracy_of(row)]
     return [ending_text(row), *(texts if row["ending"] in COUNT else map(Faint, texts))]
 
 
-def time_of(row: pd.Series) -> tuple[str, str]:
+def time_of(row: Row) -> tuple[str, str]:
     """Median and quartiles in ms; no quartiles of one projection."""
     low, high = (milliseconds(row[name]) for name in ("time_low", "time_high"))
     return milliseconds(row["time"]), Between.of(low, high) if row["time_count"] > 1 else ""
 
 
-def accuracy_of(row: pd.Series) -> tuple[str, str, str]:
+def accuracy_of(row: Row) -> tuple[str, str, str]:
     """Violation, relative gap, distance in mm; nothing of an answer that is not known."""
     violation, gap = row["max_violation"], row["relative_gap_max"]
     if not isfinite(violation):
@@ -73,7 +74,7 @@ def milliseconds(seconds: float) -> str:
     return seconds_text(1000 * seconds)
 
 
-def ending_text(row: pd.Series) -> str:
+def ending_text(row: Row) -> str:
     """How a cell ended, its sign before the words."""
     ending = row["ending"]
     words = {FEASIBLE: "within the limits", OUT_OF_TIME: f"out of time, {row['why']}"}

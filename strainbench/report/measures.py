@@ -17,6 +17,7 @@ from strainbench.bench.columns import STEP_COLUMNS, WORDS
 from strainbench.bench.ending import Ending
 from strainbench.bench.failure import by_clock
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row
 
 OPTIMAL, FEASIBLE, VIOLATED = "optimal", "feasible", "violated"
 OUT_OF_TIME, NO_ANSWER = "out of time", "no answer"
@@ -26,6 +27,12 @@ COUNT = (OPTIMAL, FEASIBLE)
 """Those of which times and distances count."""
 SIGNS = {OPTIMAL: "✓", FEASIBLE: "○", VIOLATED: "✗", OUT_OF_TIME: "✗", NO_ANSWER: "✗"}
 STEPS = ("steps_asked", "steps_done")
+READ = ("cell", "step", "outcome", "status", "seconds", "seconds_each", "active_constraints")
+ASKED = (
+    *("cell", "outcome", "reason", "max_violation", *STEPS),
+    *("solve_seconds_median", "solve_seconds_mean"),
+)
+"""Columns of steps, and of runs, that measures are taken of."""
 NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
 
@@ -83,19 +90,20 @@ def projections(steps: pd.DataFrame) -> pd.DataFrame:
 
 def timing(steps: pd.DataFrame) -> Quartiles:
     """Seconds a projection, over those that had something to do, all repeats of each."""
-    return Quartiles.of(s for each in every_time(projections(steps)) for s in each)
+    had = zip(every_time(steps), steps["active_constraints"], strict=True)
+    return Quartiles.of(s for each, active in had if active > 0 for s in each)
 
 
 def every_time(steps: pd.DataFrame) -> list[list[float]]:
     """For each projection all its seconds: one, or as many as it was repeated."""
-    given = steps.reindex(columns=["seconds", "seconds_each"], fill_value="")
+    several = steps["seconds_each"] if "seconds_each" in steps else [""] * len(steps)
     return [
         [float(word) for word in each.split()] if each else [float(once)]
-        for once, each in given.itertuples(index=False)
+        for once, each in zip(steps["seconds"], several, strict=True)
     ]
 
 
-def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
+def finish(run: Row, steps: pd.DataFrame) -> Finish:
     """How a cell ended; a projection that the clock cut off is no violation.
 
     Parameters
@@ -105,11 +113,12 @@ def finish(run: pd.Series, steps: pd.DataFrame) -> Finish:
     asked, done = (0 if pd.isna(run[name]) else int(run[name]) for name in STEPS)
     if run["outcome"] in COUNT:
         return Finish(run["outcome"], done, asked)
-    failed = steps[~steps["outcome"].isin(COUNT)]
-    cut_off = failed[failed["status"].map(by_clock).astype(bool)]
+    said = zip(steps["step"], steps["outcome"], steps["status"], strict=True)
+    failed = [(step, status) for step, outcome, status in said if outcome not in COUNT]
+    cut_off = [step for step, status in failed if by_clock(status)]
     ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
     if ended or (run["outcome"] != NO_ANSWER and 0 < len(cut_off) == len(failed)):
-        done -= cut_off["step"].nunique()
+        done -= len(set(cut_off))
         return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
     if run["outcome"] == NO_ANSWER:
         return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
@@ -134,18 +143,19 @@ def measured(runs: pd.DataFrame, steps: pd.DataFrame) -> pd.DataFrame:
     ----------
     steps : of all cells, as `newest_steps` has them
     """
-    parsed = numbers(steps)
+    parsed = numbers(steps[[name for name in READ if name in steps]])
     own, none = dict(iter(parsed.groupby("cell"))), parsed.iloc[:0]
-    rows = [_measures(run, own.get(run["cell"], none)) for _, run in runs.iterrows()]
+    asked = runs[[*ASKED]].to_dict("records")
+    rows = [_measures(run, own.get(run["cell"], none)) for run in asked]
     return runs.assign(**pd.DataFrame(rows, columns=list(NEW), index=runs.index))
 
 
-def _measures(run: pd.Series, steps: pd.DataFrame) -> tuple[object, ...]:
+def _measures(run: Row, steps: pd.DataFrame) -> tuple[object, ...]:
     """The entries of NEW."""
     end, time = finish(run, steps), timing(steps)
     if steps.empty:
-        own = run[["solve_seconds_median", "solve_seconds_mean"]].dropna()
-        time = Quartiles.of(own[:1])._replace(n=0)
+        own = (run["solve_seconds_median"], run["solve_seconds_mean"])
+        time = Quartiles.of([s for s in own if s == s][:1])._replace(n=0)
     return (end.ending, end.done, end.why, *time)
 
 
@@ -189,7 +199,7 @@ def seconds_text(seconds: float) -> str:
     return digits(seconds) if isfinite(seconds) else ""
 
 
-def distance_of(row: pd.Series) -> str:
+def distance_of(row: Row) -> str:
     """A cell's largest distance in mm; nothing where it or the reference's error is unknown."""
     mm, error = 1000 * row["distance_max"], 1000 * row["reference_error_max"]
     return distance_text(mm, error) if isfinite(mm) and error != inf else ""

@@ -11,6 +11,7 @@ import pandas as pd
 
 from strainbench import escape
 from strainbench.bench.mode import replays, window
+from strainbench.report.rows import Row
 
 SPANNED = ("resolution", "limit")
 """Settings that have rows and columns of their own within a table."""
@@ -64,7 +65,7 @@ def describe(
     )
 
 
-def played(row: pd.Series) -> str:
+def played(row: Row) -> str:
     """Which steps of a scene a cell is about."""
     first, last = window(row["mode"], int(row["steps_asked"]))
     what = "replayed frames" if replays(row["mode"]) else "simulated steps"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
@@ -15,6 +15,7 @@ from strainbench.report.lines import accuracy_of, milliseconds, ranked, time_of
 from strainbench.report.measures import COUNT, FEASIBLE, OPTIMAL, OUT_OF_TIME, VIOLATED
 from strainbench.report.names import HOW, cells
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row
 from strainbench.report.table import UNCONSTRAINED, Group, groups
 
 
@@ -23,7 +24,7 @@ class Quantity:
     """What is said of a cell: its columns, their texts, and its words in caption and note."""
 
     columns: Sequence[Column]
-    texts: Callable[[pd.Series], Sequence[str]]
+    texts: Callable[[Row], Sequence[str]]
     words: str
     note: str
 
@@ -167,26 +168,26 @@ class Sheet:
             ]
         lines: list[list[str]] = []
         here = self.runs[self.runs["mesh"].isin(meshes)]
+        on_mesh = {mesh: ranked(here[here["mesh"] == mesh]).to_dict("records") for mesh in meshes}
         for kind, methods in _kinds(here, meshes).items():
             if methods and KINDS[kind]:
                 lines.append([Span.of(KINDS[kind], len(header))])
-            lines += [list(self.line(method, here, meshes)) for method in methods]
+            lines += [list(self.line(method, on_mesh)) for method in methods]
         return Table(self.caption(), header, lines, notes=self.notes(lines, here))
 
-    def line(self, method: str, here: pd.DataFrame, meshes: Sequence[str]) -> Iterator[str]:
-        """A method on each mesh; what failed has its reason instead of numbers."""
+    def line(self, method: str, on_mesh: Mapping[str, Sequence[Row]]) -> Iterator[str]:
+        """A method on each mesh, of whose cells the best is the first; what failed has its reason
+        instead of numbers."""
         yield method
-        for mesh in meshes:
-            on_mesh = ranked(here[here["mesh"] == mesh])
-            rows = on_mesh[on_mesh["solver"] == method]
-            if rows.empty:
+        for rows in on_mesh.values():
+            row = next((row for row in rows if row["solver"] == method), None)
+            if row is None:
                 yield Span.of(NOT_RUN, len(self.columns))
                 continue
-            row = rows.iloc[0]
             if row["ending"] not in COUNT:
                 yield Span.of(failure(row), len(self.columns))
                 continue
-            best = row["ending"] == OPTIMAL and on_mesh.iloc[0]["solver"] == method
+            best = row["ending"] == OPTIMAL and rows[0]["solver"] == method
             for quantity in self.chosen:
                 first, *others = quantity.texts(row)
                 yield from (Strong(first) if best and first else first, *others)
@@ -228,13 +229,13 @@ class Sheet:
         return [Prose(text) for text in told]
 
 
-def failure(row: pd.Series) -> str:
+def failure(row: Row) -> str:
     """What went wrong in a cell, in a few words."""
     why = str(row["why"])
     return f"× {why} {_step(row)}s" if row["ending"] == OUT_OF_TIME else f"× {why}"
 
 
-def _step(row: pd.Series) -> str:
+def _step(row: Row) -> str:
     """What a cell's steps are called."""
     return "frame" if replays(row["mode"]) else "step"
 

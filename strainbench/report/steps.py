@@ -21,4 +21,4 @@ def newest_steps(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
 @lru_cache(maxsize=2)  # a report asks many times
 def _read(folder: Path, state: tuple[tuple[int, int], ...]) -> pd.DataFrame:  # noqa: ARG001
     """All of them, as long as the files are as they were."""
-    return pd.DataFrame(latest_steps(folder), columns=list(STEP_COLUMNS))
+    return pd.DataFrame(latest_steps(folder), columns=list(STEP_COLUMNS), dtype=object)

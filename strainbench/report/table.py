@@ -19,6 +19,7 @@ from strainbench.report.machine import machine_section
 from strainbench.report.measures import COUNT, NO_ANSWER
 from strainbench.report.names import digits_of
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row, rows_of
 
 GROUP = ["scenario", "mode", "exact", "tolerance", "steps_asked", "threads"]
 UNCONSTRAINED = "none"  # the solver whose rows show implicit Euler alone
@@ -116,7 +117,7 @@ def groups(runs: pd.DataFrame) -> Iterator[Group]:
         yield Group(", ".join(filter(None, parts)), rows)
 
 
-def mark(row: pd.Series) -> str:
+def mark(row: Row) -> str:
     """ "-" for no usable answer, "*" for some steps not converged, else nothing."""
     if row["ending"] == NO_ANSWER or row["steps_done"] == 0:
         return "-"
@@ -130,7 +131,7 @@ def tidy(runs: pd.DataFrame) -> pd.DataFrame:
     table["seconds"] = runs["solve_seconds_mean"]
     for column, name in TIMES.items():
         table[name] = runs[column]
-    table["mark"] = [mark(row) for _, row in runs.iterrows()]
+    table["mark"] = [mark(row) for row in rows_of(runs)]
     table["ie_seconds_mean"] = runs["ie_seconds_mean"].where(runs["ie_seconds_mean"] > 0)
     for column in ("outcome", "max_violation", "relative_gap_max"):
         table[column] = runs[column]
@@ -156,7 +157,7 @@ def explanation(runs: pd.DataFrame) -> str:
     ) + (LOCAL if local.any() else "")
 
 
-def scene(row: pd.Series) -> str:
+def scene(row: Row) -> str:
     """A row's scene, with its mesh, its limit, and what tells it from others of the folder."""
     name = f"{row['scenario']} {row['mesh']}"
     return ", ".join(
@@ -168,7 +169,7 @@ def reasons(runs: pd.DataFrame) -> Document:
     """A line for each cell that is not optimal on every step, or not what its scene is about."""
     lines = [
         f"{scene(r)}, {r['mode']}, {r['solver']}: {r['outcome']}; {r['reason']}"
-        for _, r in runs.iterrows()
+        for r in rows_of(runs)
         if r["reason"] and r["solver"] != UNCONSTRAINED
     ]
     return Document(
@@ -180,7 +181,7 @@ def older(runs: pd.DataFrame) -> list[str]:
     """A line for each way in which rows are older than what is installed, and which these are."""
     lines = []
     for how, rows in runs[runs["older"] != ""].groupby("older", sort=False):
-        names = [f"{scene(r)}, {r['solver']}" for _, r in rows.iterrows()]
+        names = [f"{scene(r)}, {r['solver']}" for r in rows_of(rows)]
         which = "" if len(rows) == len(runs) else f": {'; '.join(names)}"
         lines.append(f"{len(rows)} of {len(runs)} cells were measured {how}{which}")
     return lines
@@ -189,7 +190,7 @@ def older(runs: pd.DataFrame) -> list[str]:
 def disturbed(runs: pd.DataFrame) -> list[str]:
     """A line for each cell that was measured beside other work."""
     beside = runs[runs["load"] > OTHER_WORK]
-    return [f"{scene(r)}, {r['solver']}: load {r['load']:.1f}" for _, r in beside.iterrows()]
+    return [f"{scene(r)}, {r['solver']}: load {r['load']:.1f}" for r in rows_of(beside)]
 
 
 def details(runs: pd.DataFrame) -> Document:
@@ -199,7 +200,7 @@ def details(runs: pd.DataFrame) -> Document:
         + ", ".join(
             f"{k.replace('_', ' ')} {v:.4f}" for k, v in json.loads(r["details_mean"]).items()
         )
-        for _, r in runs.iterrows()
+        for r in rows_of(runs)
         if r["details_mean"]
     ]
     return Document("Inside the solve, means", [Items(lines)])

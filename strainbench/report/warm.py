@@ -56,14 +56,21 @@ def _number(value: float) -> str:
 
 def starts_warm(run: pd.Series) -> bool:
     """Whether a row's solver started from the frame before."""
-    return json.loads(run["solver_parameters"] or "{}").get("warm") is True
+    return _warm(run["solver_parameters"])
+
+
+def _warm(parameters: str) -> bool:
+    return json.loads(parameters or "{}").get("warm") is True
 
 
 def pairs(runs: pd.DataFrame) -> list[Pair]:
     """The cells that ran both ways."""
     same = ["scenario", "mode", "scenario_parameters", "tolerance", "steps_asked"]
-    cold = {(*r[same], r["solver"]): r for _, r in runs.iterrows() if not starts_warm(r)}
-    warm = [r for _, r in runs.iterrows() if starts_warm(r)]
+    warms = runs["solver_parameters"].map(_warm).astype(bool)
+    if not warms.any():
+        return []
+    cold = {(*r[same], r["solver"]): r for _, r in runs[~warms].iterrows()}
+    warm = [r for _, r in runs[warms].iterrows()]
     keys = [(*r[same], r["solver"].removesuffix(SUFFIX)) for r in warm]
     return [Pair(cold[k], r) for k, r in zip(keys, warm, strict=True) if k in cold]
 

@@ -10,6 +10,7 @@ import shutil
 import statistics
 from math import floor, log10
 
+import numpy as np
 import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
@@ -121,36 +122,107 @@ def test_every_entry_of_a_row_is_in_its_record(page, field):
             assert same, (name, value, found[name])
 
 
-COLUMN = {
-    "time": lambda run, steps: 1000 * statistics.median(steps),
-    "distance": lambda run, steps: 1000 * float(run["distance_max"]),
-    "violation": lambda run, steps: float(run["max_violation"]),
-}
+UNITS = {"s": 1, "ms": 1e-3, "µs": 1e-6, "m": 1e3, "cm": 10, "mm": 1, "µm": 1e-3, "nm": 1e-6}
+TWO_DIGITS, POWER, DRAWN_TO = 0.06, 0.5, 1e-4  # relative
 
 
-def test_numbers_of_the_table_trace_to_rows(page, field):
-    """Fifty at random, or all."""
-    runs = {run["cell"]: run for run in read(field, "runs.csv")}
+def expected_of(field):
+    """What each cell comes to, in s and mm, worked out anew from the files alone."""
     active = {}
     for step in read(field, "steps.csv"):
         if float(step["active_constraints"] or 0) > 0:
             active.setdefault(step["cell"], []).append(float(step["seconds"]))
+    found = {}
+    for run in read(field, "runs.csv"):
+        if run["cell"] not in active:  # without a step nothing is shown
+            continue
+        low, time, high = np.quantile(active[run["cell"]], [0.25, 0.5, 0.75])
+        far = {"mm": "distance_max", "bound": "distance_bound_max", "error": "reference_error_max"}
+        found[run["cell"]] = {
+            **{"time": time, "low": low, "high": high, "mean": float(run["solve_seconds_mean"])},
+            **{key: 1000 * float(run[name] or "nan") for key, name in far.items()},
+            "gap": float(run["relative_gap_max"] or "nan"),
+            "violation": float(run["max_violation"] or "nan"),
+        }
+    return found
+
+
+def in_tables(page, expected):
+    """(where, what is shown, what it should be, to what share of it) of Table 1, list of cells."""
+    cell = "e.closest('[data-cell]').dataset.cell"
     every = each(
         page,
-        "#table1 td[data-column]",
-        "[e.dataset.cell, e.dataset.column, e.textContent.trim()]",
+        "#table1 td[data-column], #cells td[data-column]",
+        f"[e.dataset.cell ?? {cell}, e.dataset.column, e.textContent.trim()]",
     )
-    found = [entry for entry in every if entry[1] in COLUMN and entry[2][-1:].isdigit()]
-    assert len(found) > 50
-    for cell, column, text in random.Random(0).sample(found, 50):
-        expected = COLUMN[column](runs[cell], active[cell])
-        if text.startswith("<"):
-            error = 1000 * float(runs[cell]["reference_error_max"])
-            assert expected < error == pytest.approx(float(text[1:]), rel=0.06)
-        else:
-            assert float(text) == pytest.approx(
-                expected, rel=0.06 if column != "violation" else 0.5
-            )
+    for of, column, text in every:
+        texts = text.split(" \N{EN DASH} ") if column == "quartiles" else [text]
+        names = {"quartiles": ("low", "high"), "distance": ("mm",)}.get(column, (column,))
+        for shown, name in zip(texts, names, strict=False):
+            if not shown[-1:].isdigit():
+                continue
+            scale = 1000 if name in ("time", "mean", "low", "high") else 1
+            right = expected[of]["error" if shown.startswith("<") else name]
+            share = POWER if name in ("gap", "violation") else TWO_DIGITS
+            yield (column, of), float(shown.lstrip("<")), scale * right, share
+
+
+def with_unit(text):
+    number, unit = text.split(" ")
+    return float(number) * UNITS[unit]
+
+
+def in_charts(page, expected):
+    """The same of what is drawn, and of what hovering shows."""
+    script = """(async () => (await specsOf('page-distance')))()"""
+    for name, spec in page.run(script).items():
+        points = [p for layer in spec["layer"] for p in layer["data"]["values"] if "quartiles" in p]
+        assert points
+        for point in points:
+            right, where = expected[point["cell"]], (name, point["cell"])
+            yield where, point["seconds"], right["time"], DRAWN_TO
+            yield where, point["high"], right["high"], DRAWN_TO
+            yield where, point["value"], right["mm"], DRAWN_TO
+            yield where, with_unit(point["time"]), right["time"], TWO_DIGITS
+            low, high = map(with_unit, point["quartiles"].split(" to "))
+            yield where, low, right["low"], TWO_DIGITS
+            yield where, high, right["high"], TWO_DIGITS
+            yield where, with_unit(point["accuracy"]), right["mm"], TWO_DIGITS
+            yield where, with_unit(point["certified"]), right["bound"], TWO_DIGITS
+            yield where, float(point["violation"]), right["violation"], POWER
+
+
+def in_steps(page, field):
+    """The same of each step in a cell's record."""
+    shown = page.run("data.steps.of")
+    names = ("seconds", "max_violation", "relative_gap", "distance")
+    for step in read(field, "steps.csv"):
+        mine = next(s for s in shown[step["cell"]] if s[0] == int(step["step"]))
+        for value, name in zip(mine[1:], names, strict=False):
+            if step[name] and value is not None:
+                yield (name, step["cell"]), float(value), float(step[name]), 1e-4
+
+
+def in_scores(page, field):
+    """The same of the per cent that the scores say are solved."""
+    runs = {run["cell"]: run for run in read(field, "runs.csv")}
+    solver = {cell: run["solver"] for cell, run in runs.items()}
+    had = [s for s in read(field, "steps.csv") if float(s["active_constraints"] or 0) > 0]
+    number = len({(runs[s["cell"]]["resolution"], s["step"]) for s in had})
+    for method, share in each(
+        page, "#profile tbody tr", "[e.cells[0].textContent, e.cells[1].textContent]"
+    ):
+        solved = [s for s in had if solver[s["cell"]] == method and s["outcome"] == "optimal"]
+        yield ("score", method), float(share), 100 * len(solved) / number, 0.1
+
+
+def test_numbers_trace_to_rows(page, field):
+    """Fifty at random of each kind: tables, charts with what hovering shows, steps, scores."""
+    expected, chosen = expected_of(field), random.Random(0)
+    kinds = [in_tables(page, expected), in_charts(page, expected), in_steps(page, field)]
+    for found in [*map(list, kinds), list(in_scores(page, field))]:
+        for where, shown, right, share in chosen.sample(found, min(50, len(found))):
+            assert shown == pytest.approx(right, rel=share), where
 
 
 def ask(page, mm, ms, size):
@@ -290,5 +362,38 @@ def test_names_are_text_and_nothing_else(browser, tmp_path):
         shown.run("document.querySelectorAll('main b b, main b script, #drawer script').length")
         == 0
     )
-    assert shown.run("document.querySelectorAll('script').length") == 4
+    assert shown.run("document.querySelectorAll('script:not([data-specs])').length") == 4
+    shown.close()
+
+
+def test_a_map_is_drawn_where_it_was_run(browser, tmp_path):
+    limits = {"2%": "optimal", "1%": "violated"}
+    rows = [
+        row("admm", cell=word, outcome=outcome, scenario_parameters=f'{{"limit": 0.0{word[0]}}}')
+        for word, outcome in limits.items()
+    ]
+    lines = [f"admm,{word},1/60,{outcome},,1,1,0.1,{word}" for word, outcome in limits.items()]
+    head = "method,x,y,outcome,why,first failing step,share of steps,median,cell"
+    (tmp_path / "map.csv").write_text("\n".join([head, *lines, "admm,3%,1/60,optimal,,,,,gone"]))
+    shown, _ = opened(browser, report_of(tmp_path, *rows))
+    assert each(shown, ".map tr:last-child th", "e.textContent") == ["y ↑ limit →", "1%", "2%"]
+    signs = each(shown, ".map .square", "[e.textContent, e.title.split('; ')[0]]")
+    assert signs == [["✗", "admm at limit 1%, y 1/60"], ["✓", "admm at limit 2%, y 1/60"]]
+    shown.run("document.querySelector('.map .square').click()")
+    assert "violates the limits" in shown.run("byId('drawer').innerText")
+    shown.close()
+
+
+def test_all_of_many_cases_are_drawn_when_they_come_into_view(browser, tmp_path):
+    many = 30
+    rows = [row("admm", cell=str(k), scenario_parameters=f'{{"step": {k}.5}}') for k in range(many)]
+    shown = browser.open(report_of(tmp_path, *rows), hash_="#scene=*")
+    shown.until("document.body.dataset.drawn !== undefined")
+    figures = "[...document.querySelectorAll('#speed figure.chart:not([hidden])')]"
+    assert shown.run(f"{figures}.length") == many
+    last = f"{figures}.at(-1)"
+    assert not shown.run(f"{last}.classList.contains('drawn')")
+    shown.run(f"{last}.scrollIntoView()")
+    shown.until(f"{last}.querySelector('svg') && {last}.classList.contains('drawn')")
+    assert shown.faults() == []
     shown.close()

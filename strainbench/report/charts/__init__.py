@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import islice
 from pathlib import Path
 
 import pandas as pd
 
-from strainbench.report.charts.chart import Chart, draw, draw_sheet
+from strainbench.report.charts.chart import Chart, draw, draw_sheet, sheet
 from strainbench.report.charts.convergence import convergence
 from strainbench.report.charts.energy import energy
 from strainbench.report.charts.growth import growth
@@ -14,13 +16,14 @@ from strainbench.report.charts.profile import profiles, scores
 from strainbench.report.charts.sweep import sweep
 from strainbench.report.charts.target import Target
 from strainbench.report.charts.work import work_precision
+from strainbench.report.drawing import Sheet
 
 __all__ = [
     "Chart",
     "Target",
+    "chart_sheets",
     "convergence",
     "draw",
-    "draw_charts",
     "draw_sheet",
     "energy",
     "growth",
@@ -30,38 +33,40 @@ __all__ = [
     "work_precision",
 ]
 ENDINGS = (".svg", ".png")
+MOST = 8  # charts of a kind in files: each takes a third of a second
 
 
-def draw_charts(folder: Path, runs: pd.DataFrame, steps: pd.DataFrame) -> list[Path]:
-    """Write speed-accuracy, profile, growth, energy and sweep-<setting> as SVG and PNG.
+def chart_sheets(
+    folder: Path, runs: pd.DataFrame, steps: pd.DataFrame, speed: Iterable[Chart]
+) -> list[Sheet]:
+    """Sheets of speed-accuracy, profile, growth, energy and sweep-<setting>, as SVG and PNG.
 
     Scenes of which there are several have a file each, `-2` and so on; their meshes and limits
-    stand beside each other.
+    stand beside each other. Of each kind the first MOST charts have files; the page has all.
 
     Parameters
     ----------
     runs : as `strainbench.report.measures.measured` returns them
     steps : as `strainbench.report.steps.newest_steps` does
+    speed : as `work_precision` makes them for a page
     """
-    sheets = {
-        **_by_figure(work_precision(runs, Target.PAGE)),
+    named = {
+        **_by_figure(speed),
         **{chart.name: [chart] for chart in profiles(runs, steps, Target.PAGE)},
-        **{chart.name: [chart] for chart in growth(runs, Target.PAGE)},
-        "energy": energy(folder, runs, Target.PAGE),
-        **{f"sweep-{key}": charts for key, charts in sweep(runs, Target.PAGE).items()},
+        **{chart.name: [chart] for chart in growth(runs, Target.PAGE)[:MOST]},
+        "energy": energy(folder, runs, Target.PAGE)[:MOST],
+        **{f"sweep-{key}": charts[:MOST] for key, charts in sweep(runs, Target.PAGE).items()},
     }
-    written = []
-    for name, charts in sheets.items():
-        if charts:
-            paths = [folder / (name + ending) for ending in ENDINGS]
-            draw_sheet(charts, paths, columns=2)
-            written += paths
-    return written
+    return [
+        sheet(charts, [folder / (name + ending) for ending in ENDINGS], 2)
+        for name, charts in named.items()
+        if charts
+    ]
 
 
-def _by_figure(charts: list[Chart]) -> dict[str, list[Chart]]:
+def _by_figure(charts: Iterable[Chart]) -> dict[str, list[Chart]]:
     """Charts that have their axes in common, by the name of their file."""
     figures: dict[str, list[Chart]] = {}
-    for chart in charts:
+    for chart in islice(charts, MOST):
         figures.setdefault(chart.figure, []).append(chart)
     return figures

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-import pandas as pd
+from collections.abc import Iterable, Sequence
+from math import isfinite
 
 from strainbench.report.charts.canvas import BAND, SOFT, Plane
 from strainbench.report.charts.text import Box, width
@@ -14,9 +13,9 @@ QUESTION = "question"
 """The parameter {seconds, value} that frames what is both faster and more accurate; or null."""
 
 
-def unknown_band(plane: Plane, runs: pd.DataFrame) -> float:
-    """Grey, below what the reference itself is known to; its height."""
-    error = 1000 * runs["reference_error_max"].replace(float("inf"), float("nan")).max()
+def unknown_band(plane: Plane, errors: Iterable[float]) -> float:
+    """Grey, below what the reference itself is known to, in m; its height."""
+    error = 1000 * max(filter(isfinite, errors), default=0.0)
     if not error > plane.y.low:
         return 0.0
     _, y = plane.pixel(plane.x.low, error)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
-from strainbench import escape
+from strainbench.report.drawing import Sheet
 
 
 @dataclass(frozen=True)
@@ -31,11 +29,6 @@ class Chart:
     figure: str = ""
 
 
-ENDINGS = (".svg", ".pdf", ".png")
-SVG = "http://www.w3.org/2000/svg"
-SHARP = 2.0  # pixels of a PNG for each of a chart
-
-
 def draw(chart: Chart, path: Path) -> None:
     """Write an SVG, a PDF with its fonts, or a PNG, by the ending; nothing is fetched.
 
@@ -49,46 +42,9 @@ def draw(chart: Chart, path: Path) -> None:
 
 def draw_sheet(charts: Sequence[Chart], paths: Sequence[Path], columns: int = 3) -> None:
     """Write several charts as one picture, side by side in rows, in each form; see `draw`."""
-    import vl_convert
-
-    if wrong := [path for path in paths if path.suffix not in ENDINGS]:
-        raise ValueError(f"{wrong[0]}: a name that ends in {', '.join(ENDINGS)} is valid")
-    found = [
-        vl_convert.vegalite_to_svg(_seen(chart.spec), allowed_base_urls=[]) for chart in charts
-    ]
-    svg = found[0] if len(found) == 1 else _together(found, columns)
-    for path in paths:
-        if path.suffix == ".svg":
-            path.write_text(svg, encoding="utf-8")
-        elif path.suffix == ".pdf":
-            path.write_bytes(vl_convert.svg_to_pdf(svg))
-        else:
-            path.write_bytes(vl_convert.svg_to_png(svg, scale=SHARP))
+    sheet(charts, paths, columns).draw()
 
 
-def _seen(part: Any) -> Any:
-    """A specification without control characters, which would end the whole process."""
-    match part:
-        case str():
-            return escape.seen(part)
-        case list() | tuple():
-            return [_seen(each) for each in part]
-        case dict():
-            return {_seen(key): _seen(value) for key, value in part.items()}
-    return part
-
-
-def _together(drawn: Sequence[str], columns: int) -> str:
-    """Drawings in rows of so many, as one."""
-    sizes = [ElementTree.fromstring(svg).attrib for svg in drawn]
-    parts, top, across = [], 0.0, 0.0
-    for first in range(0, len(drawn), columns):
-        row = range(first, min(first + columns, len(drawn)))
-        left = 0.0
-        for k in row:
-            own = re.sub(r"\bclip(?=\d)", f"clip{k}-", drawn[k])  # names are the whole picture's
-            parts.append(own.replace("<svg ", f'<svg x="{left:g}" y="{top:g}" ', 1))
-            left += float(sizes[k]["width"])
-        across, top = max(across, left), top + max(float(sizes[k]["height"]) for k in row)
-    size = f'width="{across:g}" height="{top:g}" viewBox="0 0 {across:g} {top:g}"'
-    return f'<svg xmlns="{SVG}" {size}>{"".join(parts)}</svg>'
+def sheet(charts: Sequence[Chart], paths: Sequence[Path], columns: int) -> Sheet:
+    """The same, to be drawn later."""
+    return Sheet([chart.spec for chart in charts], [str(path) for path in paths], columns)

@@ -17,6 +17,7 @@ from strainbench.report.charts.target import Target
 from strainbench.report.charts.work import FIGURE, labels
 from strainbench.report.measures import COUNT, OPTIMAL, duration
 from strainbench.report.names import cells, percent
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.table import UNCONSTRAINED
 
 SCENE = [*FIGURE, "bound", "tolerance"]
@@ -39,7 +40,8 @@ def growth(runs: pd.DataFrame, target: Target) -> list[Chart]:
     methods = runs[(runs["solver"] != UNCONSTRAINED) & runs["variables"].notna()]
     methods = methods.assign(label=labels(methods)).sort_values("variables", kind="stable")
     charts: list[Chart] = []
-    for _, rows in methods.groupby(SCENE, sort=False, dropna=False):
+    sizes = methods.groupby(SCENE, dropna=False)["variables"].transform("nunique")
+    for _, rows in methods[sizes > 1].groupby(SCENE, sort=False, dropna=False):
         curves, alone = _curves(rows, target)
         if curves:
             number = f"-{len(charts) + 1}" if charts else ""
@@ -55,14 +57,14 @@ def _curves(rows: pd.DataFrame, target: Target) -> tuple[list[Curve], list[str]]
         if cells_["variables"].nunique() < 2:
             alone.append(str(solver))
             continue
-        points = [_point(run) for _, run in cells_.iterrows()]
+        points = [_point(run) for run in rows_of(cells_)]
         found.append(
             Curve(about(str(solver)), f"{solver}{slope(points, target is Target.PAGE)}", points)
         )
     return found, alone
 
 
-def _point(run: pd.Series) -> Spec:
+def _point(run: Row) -> Spec:
     more = {"cell": run["cell"], "mesh": run["mesh"], "time": duration(run["time"])}
     return point(run["variables"], run["time"], run["ending"] == OPTIMAL, **more)
 
@@ -79,7 +81,7 @@ def slope(points: Sequence[Spec], roomy: bool) -> str:
 def _failures(rows: pd.DataFrame) -> Iterator[dict[str, Any]]:
     failed = rows[~rows["ending"].isin(COUNT)]
     for solver, cells_ in failed.groupby("solver", sort=False):
-        whys = [f"at {run['mesh']} {why_failed(run)}" for _, run in cells_.iterrows()]
+        whys = [f"at {run['mesh']} {why_failed(run)}" for run in rows_of(cells_)]
         yield about(str(solver)) | {"text": f"{solver} {', '.join(whys)}"}
 
 

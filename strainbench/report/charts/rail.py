@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import pandas as pd
-
 from strainbench.report.charts.canvas import Plane
 from strainbench.report.charts.target import Target
 from strainbench.report.charts.text import Box, width, wrapped
 from strainbench.report.measures import OUT_OF_TIME, VIOLATED
+from strainbench.report.rows import Row
 
 GROUND, INK = "#FBEDEA", "#A8281B"
 ROW = 1.35  # of a line, in its size
 
 
-def why_failed(run: pd.Series) -> str:
+def why_failed(run: Row) -> str:
     """Why a cell does not count, beside its name."""
     if run["ending"] == VIOLATED:
         return str(run["why"]).removeprefix("violates ")

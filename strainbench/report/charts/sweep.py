@@ -18,6 +18,7 @@ from strainbench.report.charts.target import Target
 from strainbench.report.measures import COUNT, OPTIMAL, duration
 from strainbench.report.names import cells as cells_of
 from strainbench.report.names import percent
+from strainbench.report.rows import rows_of
 from strainbench.report.sweep import beyond, differs, sweeps
 
 SPAN = 8.0  # between the least and the largest value, from which on an axis is logarithmic
@@ -114,7 +115,7 @@ def _points(cells: pd.DataFrame) -> list[Spec | None]:
             outcome=run["ending"],
             said=duration(run["time"]),
         )
-        for _, run in cells.iterrows()
+        for run in rows_of(cells)
     ]
 
 
@@ -142,7 +143,7 @@ def _failures(key: str, line: pd.DataFrame) -> list[dict[str, Any]]:
     for solver, cells in failed.groupby("solver", sort=False):
         whys = [
             f"at {_shown(key, run['value'], str(run['shown']))}: {why_failed(run)}"
-            for _, run in cells.iterrows()
+            for run in rows_of(cells)
         ]
         entries.append(about(str(solver)) | {"text": f"{solver} {', '.join(whys)}"})
     return entries

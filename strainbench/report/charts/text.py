@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +27,13 @@ HELD = "\u00a0"
 BOLD = 1.07  # times as wide, about
 HEIGHT = 1.15  # of a line, in its size
 RINGS = (1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 8.0, 10.0)
-DIRECTIONS = 16
+ANGLES = 2 * np.pi * np.arange(16) / 16
+COS, SIN = np.cos(ANGLES), np.sin(ANGLES)
+ALONG = np.arange(9) / 8  # of a leader's length
 FEW = 12  # of the cheapest places, for which leaders are looked at
 CROSSED = 25.0
+Boxes = NDArray[np.float64]
+"""(boxes, 4) left, top, right, bottom."""
 
 
 def width(text: str, size: float) -> float:
@@ -135,67 +138,74 @@ def place(
     taken : by marks and bars
     mark : half the width of a mark
     """
-    boxes, placed = list(taken), []
+    boxes, placed = _edges(list(taken)), []
     for name in names:
-        places = list(_places(name, size, mark))
-        costs = _costs(places, name, boxes, plane)
-        few = [(costs[k], k, places[k]) for k in np.argsort(costs, kind="stable")[:FEW]]
-        best = min(few, key=lambda c: c[0] + CROSSED * _crossed(c[2], name, boxes, mark))[2]
-        x, y = _nearest(best, name)
-        placed.append(Placed(name, best, hypot(x - name.x, y - name.y) > 2.2 * mark + 2))
-        boxes += [best, *along(name.x, name.y, x, y)]
+        places = _places(name, size, mark)
+        costs = _costs(places, name, boxes, _edges([plane]))
+        few = np.argsort(costs, kind="stable")[:FEW]
+        crossed = CROSSED * _crossed(places[few], name, boxes, mark)
+        best = places[few[np.argmin(costs[few] + crossed)]]
+        end = _nearest(best[None], name)
+        led = float(np.hypot(*(end[0] - (name.x, name.y)))) > 2.2 * mark + 2
+        placed.append(Placed(name, Box(*map(float, best)), led))
+        boxes = np.concatenate([boxes, best[None], _leaders(end, name)[0]])
     return placed
 
 
-def along(x: float, y: float, then_x: float, then_y: float, parts: int = 8) -> Iterator[Box]:
+def along(x: float, y: float, then_x: float, then_y: float) -> Iterator[Box]:
     """Small boxes that cover a leader."""
-    for k in range(parts + 1):
-        share = k / parts
+    for share in ALONG:
         yield Box.around(x + share * (then_x - x), y + share * (then_y - y), 1.0)
 
 
-def _places(name: Name, size: float, mark: float) -> Iterator[Box]:
+def _edges(boxes: Sequence[Box]) -> Boxes:
+    return np.array([(b.left, b.top, b.right, b.bottom) for b in boxes]).reshape(-1, 4)
+
+
+def _places(name: Name, size: float, mark: float) -> Boxes:
     """Boxes around the point, the nearest first."""
     half, up = width(name.whole, size) / 2 + 1, HEIGHT * size / 2
-    for ring in RINGS:
-        for k in range(DIRECTIONS):
-            angle = 2 * pi * k / DIRECTIONS
-            reach = mark + 2 + (ring - 1) * size
-            x = name.x + cos(angle) * (reach + half)
-            y = name.y + sin(angle) * (reach + up)
-            yield Box.around(x, y, half, up)
+    reach = mark + 2 + (np.array(RINGS) - 1)[:, None] * size
+    x = (name.x + COS * (reach + half)).ravel()
+    y = (name.y + SIN * (reach + up)).ravel()
+    return np.stack([x - half, y - up, x + half, y + up], axis=1)
 
 
-def _costs(
-    places: Sequence[Box], name: Name, taken: Sequence[Box], plane: Box
-) -> NDArray[np.float64]:
+def _costs(places: Boxes, name: Name, taken: Boxes, plane: Boxes) -> Boxes:
     """Covering anything costs more than any distance; sticking out still more."""
     covered = _shared(places, taken).sum(axis=1)
-    areas = [(box.right - box.left) * (box.bottom - box.top) for box in places]
-    outside = areas - _shared(places, [plane])[:, 0]
-    nearest = np.array([_nearest(box, name) for box in places])
-    away = np.hypot(*(nearest - (name.x, name.y)).T)
+    areas = (places[:, 2] - places[:, 0]) * (places[:, 3] - places[:, 1])
+    outside = areas - _shared(places, plane)[:, 0]
+    away = np.hypot(*(_nearest(places, name) - (name.x, name.y)).T)
     return np.asarray(100 * covered + 1000 * outside + away)
 
 
-def _shared(some: Sequence[Box], others: Sequence[Box]) -> NDArray[np.float64]:
+def _shared(some: Boxes, others: Boxes) -> Boxes:
     """The areas (a, b) that boxes of the one and the other cover both."""
-    a = np.array([(box.left, box.top, box.right, box.bottom) for box in some]).reshape(-1, 1, 4)
-    b = np.array([(box.left, box.top, box.right, box.bottom) for box in others]).reshape(1, -1, 4)
+    a, b = some[:, None], others[None]
     across = np.minimum(a[..., 2], b[..., 2]) - np.maximum(a[..., 0], b[..., 0])
     down = np.minimum(a[..., 3], b[..., 3]) - np.maximum(a[..., 1], b[..., 1])
     return np.asarray(np.maximum(across, 0.0) * np.maximum(down, 0.0))
 
 
-def _crossed(box: Box, name: Name, taken: Sequence[Box], mark: float) -> int:
-    """How many points of a leader, beyond its own mark, are taken."""
-    steps = along(name.x, name.y, *_nearest(box, name))
-    away = [s for s in steps if abs(s.left - name.x) + abs(s.top - name.y) > 2 * mark]
-    return int((_shared(away, taken) > 0).any(axis=1).sum())
+def _crossed(places: Boxes, name: Name, taken: Boxes, mark: float) -> Boxes:
+    """How many points of the leader to each place, beyond its own mark, are taken."""
+    steps = _leaders(_nearest(places, name), name)
+    away = np.abs(steps[..., :2] - (name.x, name.y)).sum(axis=2) > 2 * mark
+    met = (_shared(steps.reshape(-1, 4), taken) > 0).any(axis=1).reshape(away.shape)
+    return np.asarray((met & away).sum(axis=1))
 
 
-def _nearest(box: Box, name: Name) -> tuple[float, float]:
-    return min(max(name.x, box.left), box.right), min(max(name.y, box.top), box.bottom)
+def _nearest(places: Boxes, name: Name) -> Boxes:
+    """(places, 2) where leaders end."""
+    return np.asarray(np.clip((name.x, name.y), places[:, :2], places[:, 2:]))
+
+
+def _leaders(ends: Boxes, name: Name) -> Boxes:
+    """(ends, points, 4) small boxes that cover leaders."""
+    start = np.array([name.x, name.y])
+    points = start + ALONG[None, :, None] * (ends[:, None] - start)
+    return np.concatenate([points - 1.0, points + 1.0], axis=2)
 
 
 def spread(wanted: Sequence[float], sizes: Sequence[float], low: float, high: float) -> list[float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import isfinite
 from typing import Any
 
@@ -20,11 +21,17 @@ from strainbench.report.charts.text import Box, Name, Placed, place
 from strainbench.report.measures import COUNT, OPTIMAL, duration, length
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits_of, played
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.table import UNCONSTRAINED
 
 FIGURE = ["scenario", "mode", "exact", "steps_asked", "threads"]
 """What the panels of a figure share; they have their axes in common."""
 PANEL = ["mesh", "bound"]
+USED = [
+    *(*FIGURE, *PANEL, "cell", "solver", "tolerance", "limit", "resolution", "setting"),
+    *("ending", "done", "why", "time", "time_low", "time_high"),
+    *("distance_bound_max", "max_violation", "reference_error_max"),
+]
 HEAD = "violates the limits (by), or out of time (steps done):"
 FLOOR = 1e-9
 """Less, in mm or relative, is drawn at the lower edge, with an arrow and its value."""
@@ -73,7 +80,8 @@ def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance"
     """
     accuracy = ACCURACIES[against]
     methods = runs[runs["solver"] != UNCONSTRAINED]
-    methods = methods.assign(accuracy=accuracy.of(methods), label=labels(methods))
+    named = {"accuracy": accuracy.of(methods), "label": labels(methods)}
+    methods = methods[USED].assign(**named)
     replays_first = methods.sort_values(
         "mode", key=lambda modes: ~modes.map(replays), kind="stable"
     )
@@ -96,17 +104,18 @@ def labels(runs: pd.DataFrame) -> list[str]:
     settings = apart(runs, {*SPANNED, MESH_FILE, CURVE_FILE}, {"steps_asked": "{:.0f} steps"})
     several = [name for name in ("mode", "threads") if runs[name].nunique() > 1]
     words = {"mode": "{}", "threads": "{:.0f} threads"}
+    more = runs[several].to_dict("records")
     return [
         ", ".join(filter(None, [text, *(words[n].format(run[n]) for n in several)]))
-        for text, (_, run) in zip(settings, runs.iterrows(), strict=True)
+        for text, run in zip(settings, more, strict=True)
     ]
 
 
 @dataclass(frozen=True)
 class Panel:
-    """The cells of one mesh and limit; `rail` is that of all panels beside it."""
+    """The cells of one mesh and limit, as records; `rail` is that of all panels beside it."""
 
-    runs: pd.DataFrame
+    runs: Sequence[Row]
     target: Target
     accuracy: Accuracy
     x: Axis
@@ -115,34 +124,37 @@ class Panel:
     @property
     def title(self) -> str:
         """Scene, mesh, limit, and what else sets it apart."""
-        run = self.runs.iloc[0]
+        run = self.runs[0]
         limit = f"{run['bound']} limit" if run["bound"] else ""
         return ", ".join(filter(None, (run["scenario"], cells(run["mesh"]), limit, run["label"])))
 
-    @property
-    def counted(self) -> pd.DataFrame:
+    @cached_property
+    def counted(self) -> list[Row]:
         """Cells with a point, those that did not know their accuracy left out."""
-        known = self.runs["time"].notna() & self.runs["accuracy"].map(isfinite)
-        return self.runs[self.runs["ending"].isin(COUNT) & known]
+        kept = [run for run in self.runs if run["ending"] in COUNT]
+        return [run for run in kept if run["time"] == run["time"] and isfinite(run["accuracy"])]
 
+    @cached_property
     def failures(self) -> list[dict[str, Any]]:
         """What stands in the rail: each method that failed, where it did, why."""
-        failed = self.runs[~self.runs["ending"].isin(COUNT)]
-        several = self.runs["tolerance"].nunique() > 1
+        failed: dict[str, list[Row]] = {}
+        for run in self.runs:
+            if run["ending"] not in COUNT:
+                failed.setdefault(run["solver"], []).append(run)
+        several = len({run["tolerance"] for run in self.runs}) > 1
         entries = []
-        for solver, rows in failed.groupby("solver", sort=False):
-            whys = [_why(run, several) for _, run in rows.iterrows()]
-            text = f"{solver} {', '.join(whys)}"
-            entries.append(about(str(solver)) | {"text": text, "cell": rows["cell"].iloc[0]})
+        for solver, rows in failed.items():
+            text = f"{solver} {', '.join(_why(run, several) for run in rows)}"
+            entries.append(about(solver) | {"text": text, "cell": rows[0]["cell"]})
         return entries
 
     def rail(self) -> float:
         """How high its rail is."""
-        return rail_height(self.failures(), HEAD, self.target)
+        return rail_height(self.failures, HEAD, self.target)
 
     def chart(self, name: str, figure: str, rail: float) -> Chart:
         """All of it."""
-        empty = self.counted.empty
+        empty = not self.counted
         y = replace(self.y, title="", ticks={}) if empty else self.y
         height = 3 * self.target.sizes.text if empty else 0.0
         plane = Plane(self.target, self.title, self.x, y, rail=rail, height=height)
@@ -151,14 +163,15 @@ class Panel:
             plane.texts([middle | {"text": "no method has an answer that counts"}], "center")
         if self.target.interactive:
             question(plane)
-        band = unknown_band(plane, self.runs) if self.accuracy.scale != 1.0 else 0.0
-        draw_rail(plane, self.failures(), HEAD)
+        errors = (run["reference_error_max"] for run in self.runs)
+        band = unknown_band(plane, errors) if self.accuracy.scale != 1.0 else 0.0
+        draw_rail(plane, self.failures, HEAD)
         self._draw_points(plane, band)
         params = [{"name": QUESTION, "value": None}] if self.target.interactive else []
         return Chart(name, self.title, self._caption(), plane.spec(params), figure)
 
     def _draw_points(self, plane: Plane, band: float) -> None:
-        points = [_point(run, self.accuracy, self.y.low) for _, run in self.counted.iterrows()]
+        points = [_point(run, self.accuracy, self.y.low) for run in self.counted]
         points.sort(key=lambda p: (p["seconds"], p["value"]))
         stair = plane.stair(front(points))
         channels = plane.channels("seconds", "value")
@@ -180,13 +193,14 @@ class Panel:
         plane.names(place_names(plane, points, taken))
 
     def _caption(self) -> str:
-        run, runs = self.runs.iloc[0], self.runs
-        precision = digits_of(runs["tolerance"])
-        tolerances = ", ".join(f"{t:.{precision}g}" for t in sorted(set(runs["tolerance"]))[::-1])
+        run, several = self.runs[0], {run["tolerance"] for run in self.runs}
+        precision = digits_of(several)
+        tolerances = ", ".join(f"{t:.{precision}g}" for t in sorted(several, reverse=True))
         said = f"{played(run).capitalize()}, tolerance {tolerances}"
         more = [run["setting"]] if run["setting"] else []
-        lost = runs[runs["ending"].isin(COUNT)].drop(self.counted.index)["solver"].unique()
-        if len(lost):
+        kept = [run for run in self.runs if run["ending"] in COUNT]
+        lost = dict.fromkeys(run["solver"] for run in kept if run not in self.counted)
+        if lost:
             more.append(f"not drawn, as nothing is known of time or accuracy: {', '.join(lost)}")
         return f"{CAPTION} {'; '.join([said, *more])}.".replace("\n", " ")
 
@@ -206,13 +220,13 @@ TOOLTIP = [
 ]
 
 
-def _why(run: pd.Series, several: bool) -> str:
+def _why(run: Row, several: bool) -> str:
     """In the rail, beside the name."""
     why = why_failed(run)
     return f"at {run['tolerance']:g} {why}" if several else why
 
 
-def _point(run: pd.Series, accuracy: Accuracy, lowest: float) -> dict[str, Any]:
+def _point(run: Row, accuracy: Accuracy, lowest: float) -> dict[str, Any]:
     """A cell's point, with all that hovering shows."""
     found = about(run["solver"])
     value = float(run["accuracy"])
@@ -280,6 +294,7 @@ def _panels(figure: pd.DataFrame, target: Target, accuracy: Accuracy) -> list[Pa
     if accuracy.scale != 1.0:
         values += [1000 * v for v in figure["reference_error_max"] if v > 0]
     y = decades(accuracy.title, values, tick, int(target.sizes.height / 2.2 / target.sizes.text))
-    ordered = figure.sort_values(["limit", "resolution", "mesh"], kind="stable")
-    groups = ordered.groupby(PANEL, sort=False, dropna=False)
-    return [Panel(rows, target, accuracy, x, y) for _, rows in groups]
+    groups: dict[tuple[object, ...], list[Row]] = {}
+    for row in rows_of(figure.sort_values(["limit", "resolution", "mesh"], kind="stable")):
+        groups.setdefault(tuple(row[name] for name in PANEL), []).append(row)
+    return [Panel(rows, target, accuracy, x, y) for rows in groups.values()]

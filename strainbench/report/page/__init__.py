@@ -15,14 +15,17 @@ from strainbench.document.html import templates
 from strainbench.escape import plain
 from strainbench.progress import Track, untracked
 from strainbench.report.identity import look
-from strainbench.report.measures import OPTIMAL, measured, numbers
+from strainbench.report.measures import OPTIMAL, numbers
 from strainbench.report.names import percent, played
 from strainbench.report.page import data
+from strainbench.report.page.drawn import Drawn, Speed
 from strainbench.report.page.headline import headline
+from strainbench.report.page.maps import map_of
 from strainbench.report.page.races import CASE, with_cases
 from strainbench.report.page.sections import Section, sections
 from strainbench.report.page.tiles import tiles
 from strainbench.report.page.vega import vega_script
+from strainbench.report.rows import rows_of
 from strainbench.report.steps import newest_steps
 from strainbench.report.table import UNCONSTRAINED
 
@@ -44,6 +47,7 @@ def report_page(
     failed: pd.DataFrame,
     machines: Machines,
     files: Sequence[str],
+    speed: Speed,
     track: Track = untracked,
 ) -> str:
     """The page of a results folder.
@@ -53,11 +57,13 @@ def report_page(
     runs : as `strainbench.report.load_runs` has them
     failed : as `strainbench.report.failures.failures` has it
     files : names of what else was written, to be linked
+    speed : makes the charts of time against an accuracy
     """
     steps = newest_steps(folder, runs)
     steps = numbers(steps[[name for name in READ if name in steps]])
-    found = with_cases(measured(runs, steps))
-    parts = sections(folder, found, steps, failed, machines, track)
+    found = with_cases(runs)
+    mapped = map_of(folder, runs)
+    parts = sections(folder, found, steps, failed, machines, speed, bool(mapped), track)
     page: str = _template().render(
         title=folder.resolve().name,
         meta=_meta(found),
@@ -73,12 +79,15 @@ def report_page(
         script=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)),
         packed=data.packed(
             {
-                "specs": {chart.name: chart.specs for part in parts for chart in part.charts},
+                "cells": data.cells(found, steps),
+                "failures": data.failed_lists(failed, found),
                 "records": data.records(found),
+                "map": mapped,
                 "steps": data.step_lists(steps),
             }
         ),
-        records=Markup(data.as_json(_payload(folder, found, steps, failed, parts))),
+        specs=_specs(chart for part in parts for chart in part.charts),
+        records=Markup(data.as_json(_payload(folder, found, parts))),
     )
     return page
 
@@ -86,8 +95,6 @@ def report_page(
 def _payload(
     folder: Path,
     runs: pd.DataFrame,
-    steps: pd.DataFrame,
-    failed: pd.DataFrame,
     parts: Iterable[Section],
 ) -> dict[str, object]:
     """What the script reads."""
@@ -97,8 +104,6 @@ def _payload(
     return {
         "folder": plain(folder),
         "alone": UNCONSTRAINED,
-        "cells": data.cells(runs, steps),
-        "failures": data.failed_lists(failed, runs),
         "methods": {name: data.looks(name) for name in methods},
         "families": data.families(methods),
         "blocks": _blocks(runs),
@@ -112,6 +117,15 @@ def _payload(
     }
 
 
+def _specs(charts: Iterable[Drawn]) -> dict[str, str]:
+    """Packed, those apart that a page needs at different times: by target and accuracy."""
+    packs: dict[str, dict[str, object]] = {}
+    for chart in charts:
+        for target, spec in chart.specs.items():
+            packs.setdefault(f"{target}-{chart.about.get('against', '')}", {})[chart.name] = spec
+    return {name: data.packed(specs, data.DRAWN) for name, specs in packs.items()}
+
+
 def _blocks(runs: pd.DataFrame) -> list[list[str]]:
     """What a table is about, that with most cells and most optima first."""
     optima = (runs["ending"] == OPTIMAL).groupby([runs[name] for name in BLOCK], sort=False)
@@ -123,7 +137,7 @@ def _meta(runs: pd.DataFrame) -> str:
     """What all cells share, in a line."""
     parts = [
         *_few(runs["scene"], "{} scenes"),
-        *_few([played(row) for _, row in runs.iterrows()], ""),
+        *_few([played(row) for row in rows_of(runs)], ""),
         *_few([f"limit {percent(v)}" if v == v else "" for v in runs["limit"]], "{} limits"),
         *_few([f"directions {v}" if v else "" for v in runs["directions"].astype(str)], ""),
         *_few(runs["aim"], "{} tolerances"),

@@ -9,13 +9,24 @@ function unpacked(text) {
   return new Response(stream).json();
 }
 
+const EAGER = 24; // charts: of more, those are drawn that come near the window
+const packs = new Map();
+
+function specsOf(pack) {
+  const packed = () => document.querySelector(`[data-specs="${pack}"]`).textContent;
+  if (!packs.has(pack)) packs.set(pack, unpacked(packed()));
+  return packs.get(pack);
+}
+
 async function drawCharts() {
   if (drawing) return;
   drawing = true;
   for (let figure = nextChart(); figure; figure = nextChart()) {
     const name = figure.dataset.chart;
     const target = narrow.matches ? "phone" : "page";
-    drawn.set(name, { target, view: await drawChart(figure, data.specs[name][target]) });
+    const specs = await specsOf(`${target}-${data.charts[name].against ?? ""}`);
+    drawn.set(name, { target, view: await drawChart(figure, specs[name]) });
+    figure.classList.add("drawn");
     await new Promise((done) => setTimeout(done));
   }
   drawing = false;
@@ -24,9 +35,14 @@ async function drawCharts() {
 
 function nextChart() {
   const target = narrow.matches ? "phone" : "page";
-  return [...document.querySelectorAll("figure.chart")].find(
-    (figure) => !figure.hidden && drawn.get(figure.dataset.chart)?.target !== target,
-  );
+  const shown = [...document.querySelectorAll("figure.chart")].filter((figure) => !figure.hidden);
+  const open = shown.filter((figure) => drawn.get(figure.dataset.chart)?.target !== target);
+  return shown.length > EAGER ? open.find(isNear) : open[0];
+}
+
+function isNear(figure) {
+  const { top, bottom } = figure.getBoundingClientRect();
+  return bottom > -innerHeight && top < 2 * innerHeight;
 }
 
 async function drawChart(figure, spec) {
@@ -48,3 +64,4 @@ function ask(view) {
 
 const askCharts = () => drawn.forEach(({ view }) => ask(view));
 narrow.addEventListener("change", drawCharts);
+addEventListener("scroll", drawCharts, { passive: true });

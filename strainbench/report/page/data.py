@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 import json
+import re
 from collections.abc import Iterable, Sequence
 from math import isfinite, isnan
 from typing import Any
@@ -16,8 +17,10 @@ from strainbench.escape import plain
 from strainbench.report.identity import LOOKS, Family, look
 from strainbench.report.measures import SIGNS, distance_text, projections
 from strainbench.report.numbers import power
+from strainbench.report.rows import Row, rows_of
 
 KEPT = 5  # significant digits of a step's numbers
+DRAWN = 5  # digits of a fraction in a chart
 STEP = ("step", "seconds", "max_violation", "relative_gap", "distance")
 """Numbers of a step that are shown; what it says comes last."""
 CELL = {
@@ -49,19 +52,21 @@ def as_json(value: object) -> str:
     return text.replace("<", r"\u003c")
 
 
-def packed(value: object) -> str:
-    """As JSON, but a tenth as long: gzip in base64."""
+def packed(value: object, most: int | None = None) -> str:
+    """As JSON, but a tenth as long: gzip in base64; of fractions at most so many digits."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    if most:
+        text = re.sub(rf"(\d\.0*(?!0)\d{{{most}}})\d+", r"\1", text)
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
 def cells(runs: pd.DataFrame, steps: pd.DataFrame) -> list[dict[str, object]]:
     """A record a cell, with what the page says of it in words and the share that is optimal."""
     shares = _optimal(steps)
-    return [_cell(row, shares.get(row["cell"], 0)) for _, row in runs.iterrows()]
+    return [_cell(row, shares.get(row["cell"], 0)) for row in rows_of(runs)]
 
 
-def _cell(row: pd.Series, optimal: int) -> dict[str, object]:
+def _cell(row: Row, optimal: int) -> dict[str, object]:
     distance, error = 1000 * row["distance_max"], 1000 * row["reference_error_max"]
     asked = row["steps_asked"] * max(1, row["projections"] / max(row["steps_done"], 1))
     found = {name: _value(row[column]) for name, column in CELL.items()}

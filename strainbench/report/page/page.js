@@ -103,7 +103,9 @@ function links() {
 }
 
 async function begin() {
-  Object.assign(data, await unpacked(byId("packed").textContent)); // specs, records, steps
+  Object.assign(data, await unpacked(byId("packed").textContent)); // cells, records, steps
+  for (const cell of data.cells) cellOf.set(cell.id, cell);
+  if (!data.cells.length) return;
   document.querySelectorAll("main table").forEach(makeSortable);
   readHash();
   chips();
@@ -112,7 +114,8 @@ async function begin() {
   links();
   askSelects();
   drawMatrix();
+  drawMaps();
   refresh();
   if (state.cell) openDrawer(state.cell);
 }
-if (data.cells.length) begin();
+begin();

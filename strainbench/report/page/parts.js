@@ -1,6 +1,6 @@
 // Elements, tables, numbers; texts become text nodes, so that no name is markup.
 const data = JSON.parse(document.getElementById("records").textContent);
-const cellOf = new Map(data.cells.map((cell) => [cell.id, cell]));
+const cellOf = new Map(); // filled when all is unpacked
 const byId = (id) => document.getElementById(id);
 const distinct = (values) => [...new Set(values)];
 const RANK = ["optimal", "feasible", "violated", "out of time", "no answer"];
@@ -11,6 +11,7 @@ const WORDS = {
   "out of time": "out of time",
   "no answer": "no answer",
 };
+const SIGNS = { optimal: "✓", feasible: "○", violated: "✗", "out of time": "✗", "no answer": "✗" };
 const counts = (cell) => cell.ending === "optimal" || cell.ending === "feasible";
 
 function el(tag, attributes = {}, ...children) {

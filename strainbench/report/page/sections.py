@@ -20,7 +20,7 @@ from strainbench.report.charts import scores
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.machine import machine_section
-from strainbench.report.page.drawn import Drawn, others, speed
+from strainbench.report.page.drawn import Drawn, Speed, drawings_of
 from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import LOCAL, OLDER, details, ledger_table, older, reasons
 
@@ -52,7 +52,7 @@ HEADS = {
     "failures": (
         "Where methods fail",
         "A square says what was found, what an easier neighbour gave, and whose fault it is. "
-        "A line of a sweep ends where its method fails.",
+        "A line of a sweep ends where its method fails; a map shows over which settings it holds.",
     ),
     "convergence": (
         "Convergence and energy",
@@ -86,15 +86,17 @@ def sections(
     steps: pd.DataFrame,
     failed: pd.DataFrame,
     machines: Machines,
+    speed: Speed,
+    mapped: bool,
     track: Track,
 ) -> list[Section]:
     """Those that have something to show."""
-    charts, left_out = speed(runs, track)
-    drawings = {"speed": charts, **others(folder, runs, steps)}
-    boxes = {"table": ("table1", "cells"), "failures": ("matrix",) if len(failed) else ()}
+    drawings = drawings_of(folder, runs, steps, speed, track)
+    hard = [name for name, there in (("matrix", len(failed)), ("maps", mapped)) if there]
+    boxes: dict[str, Sequence[str]] = {"table": ("table1", "cells"), "failures": hard}
     swept = _folded("Sweeps in numbers", sweep_tables(runs), Prose(BEYOND))
     bodies = {
-        "speed": html(left_out),
+        "speed": Markup(),
         "table": _note(runs) + html(warm.table(runs), 3),
         "profile": Markup().join(html(table, 3) for table in scores(runs, steps)),
         "failures": _signs(failed, runs) + swept,
@@ -167,7 +169,7 @@ def _text(path: Path) -> Markup:
 
 def _pictures(folder: Path) -> Markup:
     """The folder's pictures that are not charts of ours, the small ones in the page."""
-    drawn = ("speed-accuracy", "energy", "sweep-", "profile", "growth")
+    drawn = ("speed-accuracy", "energy", "sweep-", "profile", "growth", "map-")
     paths = [
         path
         for path in sorted(folder.iterdir())

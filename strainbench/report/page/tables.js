@@ -154,3 +154,34 @@ function worstOf(row) {
   const [scene, ...settings] = line.case.split(", ");
   return `${settings.join(", ") || scene}: ${line.found}`;
 }
+
+// A small grid a method: outcomes over two settings, where it was run.
+function drawMaps() {
+  const box = byId("maps");
+  if (!box) return;
+  const { names, levels, spots } = data.map;
+  const grids = Object.entries(spots).map(([method, own]) => {
+    const at = (i, j) => own.find((spot) => spot[0] === i && spot[1] === j);
+    const rows = levels.y.map((level, j) =>
+      el("tr", {}, el("th", { scope: "row" }, level), ...levels.x.map((_, i) => el("td", {}, mapSpot(at(i, j), method, names, [levels.x[i], level])))),
+    );
+    const heads = levels.x.map((level) => el("th", { scope: "col", class: "case" }, el("span", {}, level)));
+    const foot = el("tr", {}, el("th", {}, `${names.y} ↑ ${names.x} →`), ...heads);
+    const grid = el("table", { class: "map" }, el("tbody", {}, ...rows.reverse(), foot));
+    return el("figure", { "data-method": method }, el("figcaption", {}, named(method)), el("div", { class: "scroll" }, grid));
+  });
+  box.replaceChildren(
+    el("h3", {}, `Map over ${names.x} and ${names.y}`),
+    el("p", { class: "caption" }, "✓ optimal on every step, ○ within the limits, ✗ neither; empty: not run, as the cells around it agree. A square opens its record."),
+    el("div", { class: "maps" }, ...grids),
+  );
+}
+
+function mapSpot(spot, method, names, [x, y]) {
+  if (!spot) return "";
+  const [, , ending, why, id] = spot;
+  const cell = cellOf.get(id);
+  const title = [`${method} at ${names.x} ${x}, ${names.y} ${y}`, [WORDS[ending], why].filter(Boolean).join(": "), cell?.time ? duration(cell.time) : ""].filter(Boolean).join("; ");
+  const look = { optimal: "optimal", feasible: "feasible" }[ending] ?? "violated";
+  return el("button", { type: "button", class: `square ${look}`, title, onclick: () => openDrawer(id) }, SIGNS[ending]);
+}
