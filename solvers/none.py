@@ -15,6 +15,7 @@ class NoProjection(Solver):
     name = "none"
     takes_exact = True
     takes_lower = True
+    takes_principal = True
 
     def solve(
         self,

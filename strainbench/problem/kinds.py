@@ -46,7 +46,7 @@ class Kind(ABC):
         "semidefinite" where it is their spectral norm: see `strainbench.problem.conic`
     """
 
-    formula: ClassVar[str]
+    formula: str
     cone: ClassVar[Literal["second-order", "semidefinite"] | None] = None
 
     def __init__(
