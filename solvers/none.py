@@ -16,6 +16,7 @@ class NoProjection(Solver):
     takes_exact = True
     takes_lower = True
     takes_principal = True
+    takes_metric = True
 
     def solve(
         self,

@@ -30,7 +30,7 @@ from threadpoolctl import threadpool_limits
 from strainbench.arrays import FloatArray
 from strainbench.problem.dual import dual_gap, relative
 from strainbench.problem.problem import Problem
-from strainbench.referee.kkt import kkt_residual
+from strainbench.referee.kkt import kkt_residual, smallest_gap
 from strainbench.referee.reference import Reference, reference_of
 from strainbench.solver.solver import check_threads
 
@@ -196,6 +196,8 @@ def _certify_local(
         reason = f"at best a local optimum: KKT residual {residual:.2e}"
     if outcome == "feasible":
         reason += f", objective {excess:.2e} above the best known"
+    if np.isfinite(values := smallest_gap(problem, x)):
+        reason += f", singular values {values:.0e} apart where limits are active"
     return Certificate(
         outcome=outcome,
         reason=reason,

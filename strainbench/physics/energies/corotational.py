@@ -92,7 +92,8 @@ class Corotational(Energy):
         lam, mu = self.lame
         others = np.full((len(frames.s), 6), 2 * mu)
         others[:, 0] += 3 * lam
-        return self.volumes[:, None] * np.concatenate([others, twists], axis=1)
+        values: FloatArray = self.volumes[:, None] * np.concatenate([others, twists], axis=1)
+        return values
 
     def _twists(self, s: FloatArray) -> FloatArray:
         """(e, 3) eigenvalues of the twists [Pa]."""
