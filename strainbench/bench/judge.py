@@ -72,12 +72,13 @@ def unjudged(cell: Cell, folder: Path, ending: str, failure: str) -> Verdict:
 def _certificates(cell: Cell, folder: Path, count: int, kept: Kept | None) -> list[Certificate]:
     if not count:
         return []
-    problem = cell.scenario.scenario().problem()
-    references = ReferenceSolver(problem, kept)
+    scene = cell.scenario.scenario()
+    problem = scene.problem()
+    references, start = ReferenceSolver(problem, kept), problem.target
     certificates = []
     with (folder / JUDGED).open("wb") as judged:
         for target, positions in read_frames(folder, count):
-            frame = problem.with_target(target)
+            frame, start = scene.frame(problem, target, start), positions
             certificates.append(certify(frame, positions, VIOLATION, GAP, references(frame)))
             judged.write(b".")
             judged.flush()

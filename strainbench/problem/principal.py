@@ -6,6 +6,7 @@ import copy
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strainbench.arrays import FloatArray, IntArray, frozen_array, read_only
 from strainbench.problem.kinds import Kind
@@ -67,8 +68,10 @@ class PrincipalLimits(Kind):
         self._sides = self._limited()
         if not self._sides:
             raise ValueError("limits: no axis is limited; one at least, below or above, is valid")
-        rows = len(self.values(np.eye(3, dim)[None])[0])
-        super().__init__(np.eye(dim), np.zeros(rows))
+        at_rest = [g.shape[1:] for g in self._demands(rotation_svd(np.eye(3, dim)[None]))]
+        which = [np.tile(np.arange(k) + 3 * side, n) for side, (n, k) in enumerate(at_rest)]
+        self._limit_of_row = np.concatenate(which)
+        super().__init__(np.eye(dim), np.zeros(len(self._limit_of_row)))
         words = f"{self.lower_limits.tolist()} to {self.upper_limits.tolist()}"
         self.formula = f"C(F_e) >= 0, {kind} limits {words}"
 
@@ -93,14 +96,23 @@ class PrincipalLimits(Kind):
         """See the base class."""
         return False
 
+    @property
+    def tightest(self) -> float:
+        """The least strain that is a limit; 0 only where a limit is the rest length itself."""
+        both = np.concatenate([self.lower_limits, self.upper_limits])
+        return float(np.nanmin(np.abs(both - 1)))
+
     def values(self, F: FloatArray) -> FloatArray:
         """(e, c) C at F (e, 3, dim): 0 or more within the limits, [strain]."""
         return self._values(rotation_svd(F))
 
     def _values(self, frames: Frames) -> FloatArray:
+        return np.concatenate([_by_element(g) for g in self._demands(frames)], axis=1)
+
+    def _demands(self, frames: Frames) -> list[FloatArray]:
+        """(e, n, k) C below and above, of k rows a principal axis."""
         s, c, demand = frames.s, frames.components, KINDS[self.name]
-        sides = [sign * demand(s, c, limit).value for sign, limit in self._sides]
-        return np.concatenate([_by_element(g) for g in sides], axis=1)
+        return [sign * demand(s, c, limit).value for sign, limit in self._sides]
 
     def linearised(self, F: FloatArray, rows: str = "exact") -> tuple[FloatArray, FloatArray]:
         """C (e, c), and its derivative (e, c, 3, dim), at F (e, 3, dim).
@@ -128,6 +140,18 @@ class PrincipalLimits(Kind):
         finite = np.isfinite(F).all(axis=(1, 2))  # LAPACK raises for others
         found = np.full((len(F), len(self.bounds)), np.nan)
         found[finite] = -self.values(F[finite])
+        return found.ravel()
+
+    def whichever_axis(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(e c,) marked rows, and those of the same limit on an element's other principal axes.
+
+        Principal axes are numbered by size, so that a row of one F may be another's of the next.
+        Isotropic limits see sizes alone, and keep theirs.
+        """
+        if self.name == "isotropic":
+            return rows
+        limit = self._limit_of_row
+        found: NDArray[np.bool_] = rows.reshape(-1, len(limit)) @ (limit[:, None] == limit)
         return found.ravel()
 
     def derivatives(self, rows: FloatArray, active: IntArray) -> tuple[IntArray, FloatArray]:

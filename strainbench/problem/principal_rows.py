@@ -54,7 +54,7 @@ class Frames(NamedTuple):
     @property
     def gaps(self) -> FloatArray:
         """(e,) least difference of two absolute singular values."""
-        least: FloatArray = -np.diff(np.sort(np.abs(self.s), axis=1)[:, ::-1]).max(axis=1)
+        least: FloatArray = np.diff(np.sort(np.abs(self.s), axis=1)).min(axis=1)
         return least
 
 
