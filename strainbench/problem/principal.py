@@ -102,6 +102,12 @@ class PrincipalLimits(Kind):
         both = np.concatenate([self.lower_limits, self.upper_limits])
         return float(np.nanmin(np.abs(both - 1)))
 
+    @property
+    def strains(self) -> FloatArray:
+        """Those of the limited axes that are stretched to less than the double."""
+        strains = self.upper_limits - 1
+        return strains[strains < 1]
+
     def values(self, F: FloatArray) -> FloatArray:
         """(e, c) C at F (e, 3, dim): 0 or more within the limits, [strain]."""
         return self._values(rotation_svd(F))

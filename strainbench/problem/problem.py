@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import copy
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -78,9 +78,7 @@ class Problem:
     linearise_at: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        def put(name: str, value: object) -> None:
-            object.__setattr__(self, name, value)
-
+        put = partial(object.__setattr__, self)
         put("rest", checks.checked_rest(self.rest))
         if self.rest.ndim == 3:  # the target says how many vertices there are
             put("target", frozen_array("target", self.target, 2))
@@ -268,8 +266,8 @@ class Problem:
     def objective(self, positions: FloatArray) -> float:
         """1/2 ||x - target||^2 in the problem's norm, in m^2, or in kg m^2 with masses."""
         difference = positions - self.target
-        if self.metric is not None:
-            return 0.5 * float(difference.ravel() @ (self.metric @ difference.ravel()))
+        if (A := self.metric) is not None:
+            return 0.5 * float(np.vdot(difference, A @ difference.ravel()))
         return 0.5 * float(np.sum(self.weights[:, None] * difference**2))
 
     def infeasible_pins(self) -> str | None:

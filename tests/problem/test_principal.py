@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import sqrtm
 
-from strainbench import Problem, StretchLimits, certify, solve
+from strainbench import PrincipalLimits, Problem, StretchLimits, certify, solve
 from strainbench.problem.draws import rotation
-from strainbench.problem.principal import PrincipalLimits
 from strainbench.problem.principal_rows import KINDS, rotation_svd
 from strainbench.solver.registry import find_solver, list_solvers
 

@@ -12,9 +12,8 @@ from scenarios.beam import Beam
 from solvers.lcp_pgs import LcpPgs
 from solvers.lcp_pgs.step import Linearised
 from solvers.lcp_qp import LcpQp
-from strainbench import Problem, StretchLimits, certify, solve
+from strainbench import PrincipalLimits, Problem, StretchLimits, certify, solve
 from strainbench.problem.grid import square_grid
-from strainbench.problem.principal import PrincipalLimits
 from strainbench.scenario.stage import Stage
 
 EXACT = {"residual": 1e-9, "max_sweeps": 100_000}

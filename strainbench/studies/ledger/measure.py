@@ -27,8 +27,10 @@ from strainbench.physics.energies.contact import Contact, Floor
 from strainbench.physics.implicit_euler import NewtonSettings, minimise_step
 from strainbench.referee.reference import reference_of
 from strainbench.scenario.cloth import ClothScenario
+from strainbench.scenario.registry import find_scenario, list_scenarios
 from strainbench.scenario.scenario import Scenario, SheetScenario
 from strainbench.scenario.stage import Stage, StageError, Who
+from strainbench.scenario.volume import VolumeScenario
 from strainbench.solver.solver import Solver
 
 PARTS = ("inertia", "gravity", "membrane", "bending", "contact", "wind")
@@ -63,6 +65,12 @@ class Row:
     distance_edges: float | None = None  # the same in mean edge lengths
     energy_mj: float | None = None  # more than as it is, both counted with the scene's own parts
     note: str = ""
+
+
+def of_cloth() -> list[str]:
+    """Our scenes but those of volumes, whose limits the solvers of cloth do not take."""
+    names = (entry.name for entry in list_scenarios())
+    return [name for name in names if not issubclass(find_scenario(name), VolumeScenario)]
 
 
 def account(cell: Cell) -> Iterator[Row]:
