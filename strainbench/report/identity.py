@@ -126,7 +126,7 @@ LOOKS = {
         Look(Family.LOCAL, "fast-projection", "#E58AB4", DOME, (2, 2)),
         Look(Family.LOCAL, "gauss-seidel-strain", "#A9799A", _regular(5, 1 / 2), (6, 2, 1, 2)),
         Look(Family.LOCAL, "gauss-seidel-principal", "#D3AFC6", _regular(5, 1 / 4), (1, 2)),
-        Look(Family.LOCAL, "lcp-pgs", "#7B2D5B", _regular(7), (1, 2)),
+        Look(Family.LOCAL, "lcp-pgs", "#7B2D5B", _regular(6, 1 / 12), (1, 2)),
         Look(Family.NONE, "none", "#6F6F6F", BAR, (1, 3)),
     )
 }
