@@ -23,7 +23,7 @@ import typer
 from strainbench.arrays import FloatArray
 from strainbench.bench.machine import describe_machine
 from strainbench.bench.records import open_folder, remember_machine
-from strainbench.document import Column, Document, Table
+from strainbench.document import Code, Column, Document, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
 from strainbench.problem.problem import Problem
@@ -164,7 +164,9 @@ def documented(
         [tuple(asdict(row).values()) for row in beams],
         about=VIOLATION,
     )
-    return Document("Limits on principal stretches of volumes", [command, about, fig_4, violation])
+    return Document(
+        "Limits on principal stretches of volumes", [Code(command), about, fig_4, violation]
+    )
 
 
 def measured(steps: Sequence[float], resolution: int) -> tuple[list[First], list[Held]]:

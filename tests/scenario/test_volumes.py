@@ -43,7 +43,11 @@ FIG_4 = {
 }
 
 
-@pytest.mark.parametrize(("kind", "step"), FIG_4)
+SLOW = ("hyperbolic", 1e-3), ("linear", 5e-3)
+CASES = [pytest.param(*c, marks=pytest.mark.slow if c in SLOW else ()) for c in FIG_4]
+
+
+@pytest.mark.parametrize(("kind", "step"), CASES)
 def test_the_first_violated_frame_is_fig_4s(kind, step):
     """Orthogonal limits freeze the beam, linear ones let it collapse, hyperbolic ones hold 5%."""
     time, top, stretch = first_violated(kind, step)
