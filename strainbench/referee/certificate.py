@@ -17,10 +17,10 @@ is used: Y may be anything, and x_ref is feasible or is not used.
 
 Lower bounds on stretch make the problem nonconvex: there is no such D, and no answer is called
 optimal. What remains is whether x meets the limits, whether it is a local optimum
-(`strainbench.referee.kkt`), and how its objective compares with the best that is known. So it is with
-limits on principal stretches, and in the norm of a metric; for the former the reason says how far
-apart singular values are where limits are active: where they are equal, what is within the limits
-depends on how they are decomposed, here by LAPACK with rotations.
+(`strainbench.referee.kkt`), and how its objective compares with the best that is known. So it is
+with limits on principal stretches, and in the norm of a metric; for the former the reason says how
+far apart singular values are where limits are active: where they are equal, what is within the
+limits depends on how they are decomposed, here by LAPACK with rotations.
 """
 
 from __future__ import annotations
