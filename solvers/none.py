@@ -15,6 +15,8 @@ class NoProjection(Solver):
     name = "none"
     takes_exact = True
     takes_lower = True
+    takes_principal = True
+    takes_metric = True
 
     def solve(
         self,

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from strainbench.physics.pattern import Blocks
     from strainbench.problem.grid import square_grid
     from strainbench.problem.limits import StretchLimits
+    from strainbench.problem.principal import PrincipalLimits
     from strainbench.problem.problem import Problem
     from strainbench.referee.certificate import Certificate, certify
     from strainbench.scenario.cloth import ClothScenario
@@ -33,6 +34,7 @@ __all__ = [
     "FloatArray",
     "IntArray",
     "Memory",
+    "PrincipalLimits",
     "Problem",
     "Scenario",
     "SheetScenario",
@@ -52,6 +54,7 @@ _HOMES = {
     "physics.pattern": ("Blocks",),
     "problem.grid": ("square_grid",),
     "problem.limits": ("StretchLimits",),
+    "problem.principal": ("PrincipalLimits",),
     "problem.problem": ("Problem",),
     "referee.certificate": ("Certificate", "certify"),
     "scenario.cloth": ("ClothScenario",),

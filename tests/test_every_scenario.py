@@ -38,7 +38,8 @@ def test_a_scene_that_moves_starts_within_its_limits(scene):
 
 def test_resolution_is_cells_a_side(scene):
     finer = replace(scene, resolution=8)
-    assert len(finer.problem().elements) == 4 * len(scene.problem().elements)
+    elements = scene.problem().elements
+    assert len(finer.problem().elements) == 2 ** (elements.shape[1] - 1) * len(elements)
 
 
 def test_every_step_asks_for_a_projection_and_converges(scene):

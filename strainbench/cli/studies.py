@@ -184,10 +184,9 @@ def keep_ledger(
 ) -> None:
     """Write what each scene models, and what each part of its physics changes in the answer."""
     from strainbench.bench.plan import plan
-    from strainbench.scenario.registry import list_scenarios
-    from strainbench.studies.ledger import write_enough, write_ledger
+    from strainbench.studies.ledger import of_cloth, write_enough, write_ledger
 
-    names = scenarios or [entry.name for entry in list_scenarios()]
+    names = scenarios or of_cloth()
     cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
     if enough and len(cells) != 1:
         raise ValueError(f"--enough: {len(cells)} scenes; one, with one value a setting, is valid")

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 
+from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray, frozen_array, index_array
 
 
@@ -34,12 +38,12 @@ def checked_elements(elements: ArrayLike, rest: FloatArray, vertices: int) -> In
     return array
 
 
-def checked_target(target: ArrayLike, vertices: int) -> FloatArray:
+def checked_target(target: ArrayLike, vertices: int, name: str = "target") -> FloatArray:
     """A position for each vertex."""
-    array = frozen_array("target", target, 2)
+    array = frozen_array(name, target, 2)
     if array.shape != (vertices, 3):
         raise ValueError(
-            f"target: shape {array.shape}, but rest has {vertices} vertices, "
+            f"{name}: shape {array.shape}, but rest has {vertices} vertices, "
             f"so ({vertices}, 3) is valid"
         )
     return array
@@ -63,3 +67,58 @@ def checked_mass(mass: ArrayLike, vertices: int) -> FloatArray:
     for vertex in np.flatnonzero(array <= 0)[:1]:
         raise ValueError(f"mass[{vertex}] is {array[vertex]}: a mass must be above 0")
     return array
+
+
+SYMMETRIC = 1e-10
+"""Entries of a metric and their mirror images are as near as that, of the largest entry."""
+
+
+def checked_metric(metric: Any, vertices: int) -> sp.csc_array:
+    """A symmetric positive definite matrix on the coordinates of all vertices, (n, 3) in C order.
+
+    It is symmetric to the last digit afterwards.
+    """
+    try:
+        A = sp.csc_array(metric, dtype=np.float64, copy=True)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"metric: not a matrix of real numbers ({error})") from None
+    size = 3 * vertices
+    if A.shape != (size, size):
+        raise ValueError(f"metric: shape {A.shape} for {vertices} vertices; ({size}, {size})")
+    A.sum_duplicates()
+    frozen_array("metric.data", A.data, 1)
+    _check_symmetric(A)
+    A = sp.csc_array((A + A.T) / 2)
+    _check_positive_definite(A)
+    A.data.setflags(write=False)
+    return A
+
+
+def _check_symmetric(A: sp.csc_array) -> None:
+    rows, columns, off = sp.find(sp.triu(A - A.T))
+    for k in np.flatnonzero(np.abs(off) > SYMMETRIC * np.abs(A.data).max(initial=0.0))[:1]:
+        i, j = rows[k], columns[k]
+        raise ValueError(
+            f"metric[{i}, {j}] is {A[i, j]:g}, but metric[{j}, {i}] is {A[j, i]:g}: "
+            "a symmetric matrix is valid"
+        )
+
+
+def _check_positive_definite(A: sp.csc_array) -> None:
+    """By the pivots of its factorisation, which SuperLU does not exchange in this mode."""
+    diagonal = A.diagonal()
+    for i in np.flatnonzero(diagonal <= 0)[:1]:
+        raise ValueError(f"metric[{i}, {i}] is {diagonal[i]:g}: a positive definite one is valid")
+    options = {"SymmetricMode": True}
+    try:
+        factor = scipy.sparse.linalg.splu(
+            A, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options
+        )
+        pivots = factor.U.diagonal()[factor.perm_c]
+    except RuntimeError:
+        pivots = np.zeros(1)  # exactly singular
+    for i in np.flatnonzero(~(pivots > 0))[:1]:
+        raise ValueError(
+            f"metric: pivot {i} of its factorisation is {pivots[i]:g}: "
+            "a positive definite matrix is valid"
+        )

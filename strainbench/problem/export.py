@@ -103,6 +103,7 @@ def as_cbf(problem: Problem, about: str, scaled: bool = False) -> bytes:
         projections of 100 to 1,300 variables: it says Solved of all, with objectives off by 3e-5 at
         most; of those in metres it says AlmostSolved of 2, and others are off by up to 2e-3.
     """
+    _check_norm(problem, "cbf")
     if not problem.convex:
         raise ValueError(
             "--format cbf: limits on compression (lower bounds) are no cones; --format npz is valid"
@@ -135,6 +136,7 @@ def guessed_objective(problem: Problem) -> float:
 
 def as_npz(problem: Problem, about: str) -> bytes:
     """All arrays of the problem and, where it is convex, of its cone program."""
+    _check_norm(problem, "npz")
     arrays: dict[str, object] = {
         "about": about,
         "rest": problem.rest,
@@ -152,6 +154,11 @@ def as_npz(problem: Problem, about: str) -> bytes:
     plain: dict[str, Any] = {name: np.asarray(value) for name, value in arrays.items()}
     np.savez_compressed(buffer, **plain)
     return buffer.getvalue()
+
+
+def _check_norm(problem: Problem, kind: str) -> None:
+    if problem.metric is not None:
+        raise ValueError(f"--format {kind}: files hold norms of masses alone, not a metric")
 
 
 def _limits(limits: object) -> dict[str, object]:

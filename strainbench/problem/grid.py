@@ -1,4 +1,4 @@
-"""Regular triangle meshes for the scenes."""
+"""Regular meshes for the scenes: triangles, and tetrahedra."""
 
 from __future__ import annotations
 
@@ -39,3 +39,34 @@ def lumped_areas(rest: FloatArray, elements: IntArray) -> FloatArray:
     areas = np.zeros(len(rest))
     np.add.at(areas, elements, shape_gradients(rest, elements)[1][:, None] / 3)
     return areas
+
+
+CORNERS = np.array(list(np.ndindex(2, 2, 2)))
+CUBE = ((0, 6, 5, 3), (4, 0, 5, 6), (2, 0, 6, 3), (1, 0, 3, 5), (7, 3, 6, 5))
+"""Five tetrahedra of a cube by the numbers of its corners, the inner one first; mirrored in the
+cubes with an even sum of indices."""
+
+
+def box_grid(cells: tuple[int, int, int], size: FloatArray) -> tuple[FloatArray, IntArray]:
+    """A box of `cells` cubes along each axis, five tetrahedra each, neighbours mirrored.
+
+    Parameters
+    ----------
+    size : (3,) lengths of its sides [m], from the origin on
+
+    Returns
+    -------
+    rest : (n, 3) [m]
+    elements : (5 cells, 4), all of positive volume
+    """
+    ticks = [np.linspace(0.0, side, count + 1) for side, count in zip(size, cells, strict=True)]
+    rest = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    cubes = np.array(list(np.ndindex(cells)))
+    even = cubes.sum(axis=1) % 2 == 0
+    mirrored = np.where(even[:, None, None], [1, 0, 0] - CORNERS * [1, -1, -1], CORNERS)
+    corners = cubes[:, None] + mirrored
+    number = np.ravel_multi_index(tuple(np.moveaxis(corners, -1, 0)), [c + 1 for c in cells])
+    elements = number[:, CUBE].reshape(-1, 4)
+    volumes = np.linalg.det(rest[elements[:, 1:]] - rest[elements[:, :1]])
+    elements[volumes < 0] = elements[volumes < 0][:, [0, 2, 1, 3]]
+    return rest, elements

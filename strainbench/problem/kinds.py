@@ -46,7 +46,7 @@ class Kind(ABC):
         "semidefinite" where it is their spectral norm: see `strainbench.problem.conic`
     """
 
-    formula: ClassVar[str]
+    formula: str
     cone: ClassVar[Literal["second-order", "semidefinite"] | None] = None
 
     def __init__(
@@ -73,6 +73,11 @@ class Kind(ABC):
     def convex(self) -> bool:
         """Whether measures are norms and bounded from above alone: optima are then certified."""
         return self.lower is None
+
+    @property
+    def strains(self) -> FloatArray:
+        """The largest strains that a picture shows as limits; none where there are none."""
+        return np.asarray(self.bounds - 1).ravel()
 
     def coefficients(self, gradients: FloatArray) -> FloatArray:
         """(e, m, k) the rows of G, from shape function gradients (e, k, dim) [1/m]."""
@@ -172,6 +177,11 @@ class Exact(Kind):
     def __init__(self, limits: StretchLimits) -> None:
         super().__init__(limits.directions, limits.bounds.min(axis=-1, keepdims=True))
         self._limits = limits
+
+    @property
+    def strains(self) -> FloatArray:
+        """Those of all axes."""
+        return np.asarray(self._limits.bounds - 1).ravel()
 
     def coefficients(self, gradients: FloatArray) -> FloatArray:
         """Each axis is scaled by D."""

@@ -11,10 +11,8 @@ the columns of F_e D, and the largest singular value of these together is bounde
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TypeVar
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,24 +20,10 @@ from numpy.typing import ArrayLike
 from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray, frozen_array, read_only
 from strainbench.problem import checks
+from strainbench.problem.cached import of_mesh
 from strainbench.problem.elements import rest_corners, shape_gradients, sparse_rows
 from strainbench.problem.kinds import Kind, Limits, kind_of
 from strainbench.problem.reach import distances, farthest, longest_edges, pins_apart
-
-Value = TypeVar("Value")
-
-
-def _of_mesh(compute: Callable[[Problem], Value]) -> cached_property[Value]:
-    """A cached property that the frames of one mesh share, whichever of them is asked first."""
-
-    def shared(problem: Problem) -> Value:
-        values: dict[str, Value] = problem._mesh  # type: ignore[attr-defined]
-        if compute.__name__ not in values:
-            values[compute.__name__] = compute(problem)
-        return values[compute.__name__]
-
-    shared.__doc__ = compute.__doc__
-    return cached_property(shared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,9 +46,12 @@ class Problem:
         Vertices held at their target.
     mass : (n,), optional
         Vertex masses [kg], the weights M of the norm; None is the unweighted norm of Eq. 5.
+    metric : (3n, 3n) sparse, optional
+        Symmetric positive definite: the norm itself, in place of the masses.
+    linearise_at : (n, 3), optional
+        Where methods of one step linearise limits [m]; at the target, if nowhere else.
 
-    All arrays are copied and read-only. A vertex in no element belongs at its target, and is held
-    there like a pinned one.
+    All arrays are copied and read-only. A vertex in no element is held at its target.
 
     Raises
     ------
@@ -87,11 +74,11 @@ class Problem:
     limits: Limits
     pinned: IntArray = ()  # type: ignore[assignment]
     mass: FloatArray | None = None
+    metric: sp.csc_array | None = None
+    linearise_at: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        def put(name: str, value: object) -> None:
-            object.__setattr__(self, name, value)
-
+        put = partial(object.__setattr__, self)
         put("rest", checks.checked_rest(self.rest))
         if self.rest.ndim == 3:  # the target says how many vertices there are
             put("target", frozen_array("target", self.target, 2))
@@ -100,15 +87,30 @@ class Problem:
         put("pinned", checks.checked_pins(self.pinned, self.vertices))
         if self.mass is not None:
             put("mass", checks.checked_mass(self.mass, self.vertices))
+        self._put_step(self.metric, self.linearise_at)
         self.kind.check(self.rest.shape[-1], len(self.elements))
         put("_mesh", {})
         _ = self._shape  # finds flat elements
 
-    def with_target(self, target: ArrayLike) -> Problem:
-        """The same mesh, limits and pins with other candidate positions (n, 3) [m]."""
+    def with_target(
+        self,
+        target: ArrayLike,
+        metric: sp.sparray | None = None,
+        linearise_at: ArrayLike | None = None,
+    ) -> Problem:
+        """The same mesh, limits and pins with other candidates (n, 3) [m], and what is given."""
         other = copy.copy(self)
         object.__setattr__(other, "target", checks.checked_target(target, self.vertices))
+        other._put_step(metric, linearise_at)
         return other
+
+    def _put_step(self, metric: sp.sparray | None, linearise_at: ArrayLike | None) -> None:
+        """Keep what differs between the steps of a scene, checked, where it is given."""
+        if metric is not None:
+            object.__setattr__(self, "metric", checks.checked_metric(metric, self.vertices))
+        if linearise_at is not None:
+            at = checks.checked_target(linearise_at, self.vertices, "linearise_at")
+            object.__setattr__(self, "linearise_at", at)
 
     def tightened(self, margin: float) -> Problem:
         """The same projection with every bound lowered by `margin`, every lower one raised."""
@@ -145,10 +147,10 @@ class Problem:
 
     @property
     def convex(self) -> bool:
-        """Whether there are no lower bounds: then the optimum is unique, and certified."""
-        return self.kind.convex
+        """Whether the optimum is unique, and certified: no lower bounds, and a norm of masses."""
+        return self.kind.convex and self.metric is None
 
-    @_of_mesh
+    @of_mesh
     def _shape(self) -> tuple[FloatArray, FloatArray]:
         return shape_gradients(self.rest, self.elements)
 
@@ -162,30 +164,30 @@ class Problem:
         """(e,) rest areas [m^2] of triangles, or volumes [m^3] of tetrahedra."""
         return self._shape[1]
 
-    @_of_mesh
+    @of_mesh
     def used(self) -> IntArray:
         """Indices of the vertices of the elements."""
         return read_only(np.unique(self.elements))
 
-    @_of_mesh
+    @of_mesh
     def isolated(self) -> IntArray:
         """Indices of the vertices in no element, and not pinned: their optimum is the target."""
         touched = np.union1d(self.used, self.pinned)
         return read_only(np.setdiff1d(np.arange(self.vertices), touched))
 
-    @_of_mesh
+    @of_mesh
     def held(self) -> IntArray:
         """Indices of the vertices that a solver leaves at their target: pinned, or isolated."""
         return read_only(np.concatenate([self.pinned, self.isolated]))
 
-    @_of_mesh
+    @of_mesh
     def free(self) -> IntArray:
         """Indices of the vertices that can move: all others."""
         return read_only(np.setdiff1d(np.arange(self.vertices), self.held))
 
-    @_of_mesh
+    @of_mesh
     def weights(self) -> FloatArray:
-        """(n,) diagonal of M: the masses, or ones."""
+        """(n,) diagonal of M: the masses, or ones. A metric is no diagonal."""
         return read_only(np.ones(self.vertices)) if self.mass is None else self.mass
 
     @property
@@ -193,7 +195,7 @@ class Problem:
         """Smallest weight of a free vertex: ||d||^2 <= ||d||_M^2 / least_weight."""
         return float(np.min(self.weights[self.free], initial=np.inf))
 
-    @_of_mesh
+    @of_mesh
     def mean_weight(self) -> float:
         """Mean weight of the elements' vertices."""
         return float(self.weights[self.used].mean())
@@ -202,35 +204,36 @@ class Problem:
     def objective_floor(self) -> float:
         """Half a squared correction of 1e-3 mean edges a vertex: the least scale of a gap."""
         correction = 1e-3 * self.edge_length
-        return 0.5 * float(np.sum(self.weights[self.free])) * correction * correction
+        diagonal = self.weights if self.metric is None else self.metric.diagonal()[::3]
+        return 0.5 * float(np.sum(diagonal[self.free])) * correction * correction
 
-    @_of_mesh
+    @of_mesh
     def edge_length(self) -> float:
         """Mean rest length of the elements' edges [m]: the problem's own length unit."""
         corners = rest_corners(self.rest, self.elements)
         return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
 
-    @_of_mesh
+    @of_mesh
     def row_vertices(self) -> IntArray:
         """(rows, k) vertices of each row of G; row e m + j is element e, direction j."""
         return read_only(np.repeat(self.elements, len(self.kind.directions), axis=0))
 
-    @_of_mesh
+    @of_mesh
     def row_coefficients(self) -> FloatArray:
         """(rows, k) entries B_k . d of each row of G [1/m]; exact limits scale each axis by D."""
         return read_only(self.kind.coefficients(self.gradients).reshape(self.rows, -1))
 
-    @_of_mesh
+    @of_mesh
     def G(self) -> sp.csr_array:  # noqa: N802
         """(rows, n) sparse: (G x)_i = F_e d, the deformed direction of constraint i."""
         return sparse_rows(self.row_vertices, self.row_coefficients, self.vertices)
 
-    @_of_mesh
+    @of_mesh
     def bounds(self) -> FloatArray:
         """(constraints,) largest stretch b_i; with exact limits that of the tightest axis."""
         return self._by_constraint(self.kind.bounds)
 
-    @_of_mesh
+    @of_mesh
     def lower_bounds(self) -> FloatArray:
         """(constraints,) least stretch; 0 without lower bounds."""
         return self._by_constraint(np.zeros(1) if self.kind.lower is None else self.kind.lower)
@@ -261,8 +264,10 @@ class Problem:
         return F
 
     def objective(self, positions: FloatArray) -> float:
-        """1/2 ||x - target||_M^2, in m^2, or in kg m^2 with masses."""
+        """1/2 ||x - target||^2 in the problem's norm, in m^2, or in kg m^2 with masses."""
         difference = positions - self.target
+        if (A := self.metric) is not None:
+            return 0.5 * float(np.vdot(difference, A @ difference.ravel()))
         return 0.5 * float(np.sum(self.weights[:, None] * difference**2))
 
     def infeasible_pins(self) -> str | None:
@@ -288,7 +293,7 @@ class Problem:
         """(k, 2) edges, and (k,) how long the limits let each become [m]."""
         return longest_edges(rest_corners(self.rest, self.elements), self.elements, self.kind)
 
-    @_of_mesh
+    @of_mesh
     def _reach(self) -> FloatArray:
         """(p, n) an upper bound on the distance of each vertex from each pin [m]."""
         return distances(*self.longest_edges(), self.vertices, self.pinned)

@@ -17,7 +17,10 @@ is used: Y may be anything, and x_ref is feasible or is not used.
 
 Lower bounds on stretch make the problem nonconvex: there is no such D, and no answer is called
 optimal. What remains is whether x meets the limits, whether it is a local optimum
-(`strainbench.referee.kkt`), and how its objective compares with the best that is known.
+(`strainbench.referee.kkt`), and how its objective compares with the best that is known. So it is
+with limits on principal stretches, and in the norm of a metric; for the former the reason says how
+far apart singular values are where limits are active: where they are equal, what is within the
+limits depends on how they are decomposed, here by LAPACK with rotations.
 """
 
 from __future__ import annotations
@@ -30,7 +33,7 @@ from threadpoolctl import threadpool_limits
 from strainbench.arrays import FloatArray
 from strainbench.problem.dual import dual_gap, relative
 from strainbench.problem.problem import Problem
-from strainbench.referee.kkt import kkt_residual
+from strainbench.referee.kkt import kkt_residual, smallest_gap
 from strainbench.referee.reference import Reference, reference_of
 from strainbench.solver.solver import check_threads
 
@@ -201,6 +204,8 @@ def _certify_local(
         reason = f"at best a local optimum: KKT residual {residual:.2e}"
     if outcome == "feasible":
         reason += f", objective {excess:.2e} above the best known"
+    if np.isfinite(values := smallest_gap(problem, x)):
+        reason += f", singular values {values:.0e} apart where limits are active"
     return Certificate(
         outcome=outcome,
         reason=reason,

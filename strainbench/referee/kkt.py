@@ -8,7 +8,8 @@ derivative, a local optimum of
 has M (x - target) + sum_i m_i g_i u_i = 0 at the free vertices, with m_i >= 0 where s_i = b_i,
 m_i <= 0 where s_i = l_i, and m_i = 0 elsewhere. The best such multipliers are a non-negative
 least-squares problem; what they leave, in the norm of M^-1, over ||x - target||_M is the residual:
-0 at a local optimum, 1 where the active limits explain nothing of the move from the target.
+0 at a local optimum, 1 where the active limits explain nothing of the move from the target. M may
+be a metric: R R^T = M then, and R is M^1/2 else.
 
 In a convex problem that is the optimum. With lower bounds it is a local one at best: the conditions
 are necessary, and hold at saddles too, such as a flat sheet that would rather fold.
@@ -16,11 +17,16 @@ are necessary, and hold at saddles too, such as a flat sheet that would rather f
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import NamedTuple
+
 import numpy as np
+import scipy
 
 from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.plugins import Library
+from strainbench.problem.principal import PrincipalLimits
 from strainbench.problem.problem import Problem
 
 clarabel = Library("clarabel")
@@ -48,35 +54,81 @@ def kkt_residual(problem: Problem, positions: FloatArray) -> float:
     movable = np.setdiff1d(np.arange(problem.vertices), problem.pinned)
     if len(movable) == 0:
         return 0.0
-    root = np.sqrt(problem.weights[movable, None])
-    force = (root * (positions - problem.target)[movable]).T.ravel()
+    root = _root_of(problem, movable)
+    force = root.transposed((positions - problem.target)[movable].T.ravel())
     scale = max(float(np.linalg.norm(force)), float(np.sqrt(2 * problem.objective_floor)))
     if scale == 0:  # the floor of tiny problems underflows
         return 0.0
-    normals = _active_normals(problem, positions, movable)
+    normals = _active_normals(problem, positions, movable, root)
     if normals.shape[1] == 0:
         return float(np.linalg.norm(force)) / scale
     multipliers = _nonnegative_least_squares(normals, -force / scale)
     return float(np.linalg.norm(normals @ multipliers + force / scale))
 
 
-def _active_normals(problem: Problem, positions: FloatArray, movable: IntArray) -> sp.csc_array:
-    """(3 movable, active) outward normals M^-1/2 g_i u_i of the active limits, of unit length."""
-    root = np.sqrt(problem.weights[movable, None])
+def _active_normals(
+    problem: Problem, positions: FloatArray, movable: IntArray, root: Root
+) -> sp.csc_array:
+    """(3 movable, active) outward normals R^-1 g_i u_i of the active limits, of unit length."""
     y = problem.G @ positions
+    active, sign = _active(problem, y)
+    rows, u = problem.kind.derivatives(y, active)
+    u = (sign[:, None, None] * u).reshape(-1, 3)
+    g = sp.csc_array(problem.G[rows.ravel()][:, movable].T)
+    together = sp.kron(sp.eye_array(len(rows)), np.ones((rows.shape[1], 1)))
+    normals = root.inverse(sp.csc_array(sp.vstack([g * a for a in u.T]) @ together))
+    length = sp.linalg.norm(normals, axis=0)
+    turns = length > 0
+    return sp.csc_array(normals[:, turns] / length[turns])
+
+
+def _active(problem: Problem, y: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Constraints near a bound, and 1 for an upper one, -1 for a lower one."""
     s = problem.kind.measure(y)
     upper = np.flatnonzero(s > problem.bounds - NEAR)
     limited = problem.kind.lower is not None
     lower = np.flatnonzero(limited & (s < problem.lower_bounds + NEAR))
-    sign = np.repeat([1.0, -1.0], [len(upper), len(lower)])
-    rows, u = problem.kind.derivatives(y, np.concatenate([upper, lower]))
-    u = (sign[:, None, None] * u).reshape(-1, 3)
-    g = sp.csc_array(problem.G[rows.ravel()][:, movable].T / root)
-    together = sp.kron(sp.eye_array(len(rows)), np.ones((rows.shape[1], 1)))
-    normals = sp.csc_array(sp.vstack([g * a for a in u.T]) @ together)
-    length = sp.linalg.norm(normals, axis=0)
-    turns = length > 0
-    return sp.csc_array(normals[:, turns] / length[turns])
+    return np.concatenate([upper, lower]), np.repeat([1.0, -1.0], [len(upper), len(lower)])
+
+
+def smallest_gap(problem: Problem, positions: FloatArray) -> float:
+    """The least difference of two singular values of an element with an active limit.
+
+    Infinite where none is active, NaN where limits are not on principal stretches.
+    """
+    if not isinstance(problem.kind, PrincipalLimits):
+        return float("nan")
+    y = problem.G @ positions
+    elements = _active(problem, y)[0] // (problem.constraints // len(problem.elements))
+    return float(np.min(problem.kind.gaps(y)[elements], initial=np.inf))
+
+
+class Root(NamedTuple):
+    """R with R R^T = M on the movable vertices, their coordinates one after the other (3, m)."""
+
+    transposed: Callable[[FloatArray], FloatArray]
+    """R^T d."""
+    inverse: Callable[[sp.csc_array], sp.csc_array]
+    """R^-1 A."""
+
+
+def _root_of(problem: Problem, movable: IntArray) -> Root:
+    if problem.metric is None:
+        root = np.tile(np.sqrt(problem.weights[movable]), 3)
+        return Root(lambda d: root * d, lambda A: sp.csc_array(A / root[:, None]))
+    unknowns = (3 * movable + np.arange(3)[:, None]).ravel()
+    A = sp.csc_array(problem.metric[unknowns][:, unknowns])
+    factor = scipy.sparse.linalg.splu(
+        A, "MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    place = np.argsort(factor.perm_r)  # no pivot is exchanged: A[place][:, place] = L D L^T
+    L, D = sp.csr_array(factor.L), factor.U.diagonal()
+
+    def inverse(B: sp.csc_array) -> sp.csc_array:
+        solved = scipy.sparse.linalg.spsolve_triangular(L, B.toarray()[place], unit_diagonal=True)
+        return sp.csc_array(solved / np.sqrt(D)[:, None])
+
+    return Root(lambda d: np.sqrt(D) * (L.T @ d[place]), inverse)
 
 
 def _nonnegative_least_squares(A: sp.csc_array, b: FloatArray) -> FloatArray:

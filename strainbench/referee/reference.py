@@ -259,4 +259,7 @@ def content_key(problem: Problem) -> str:
         problem.weights,
     ):
         digest.update(np.ascontiguousarray(array).tobytes())
+    if problem.metric is not None:
+        for array in (problem.metric.data, problem.metric.indices):
+            digest.update(array.tobytes())
     return digest.hexdigest()[:32]

@@ -69,7 +69,10 @@ def principal_stretches(problem: Problem, positions: FloatArray) -> FloatArray:
 def measured(problem: Problem, positions: FloatArray) -> str:
     """What was limited and how well, and how far the cloth is stretched in any direction."""
     kind, bounds = problem.kind, problem.kind.bounds
-    limits = " to ".join(dict.fromkeys(f"{100 * (b - 1):.3g}%" for b in _ends(bounds)))
+    ends = (
+        [f"{100 * s:.3g}%" for s in _ends(kind.strains)] if len(kind.strains) else ["what is far"]
+    )
+    limits = " to ".join(dict.fromkeys(ends))
     excess = float(problem.violations(positions).max())
     kept = f"up to {100 * excess:.2f}% beyond" if excess >= KEPT else f"within {excess:.0e} of"
     largest = float(principal_stretches(problem, positions).max())

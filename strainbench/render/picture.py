@@ -42,9 +42,9 @@ def nice_above(value: float, steps: Sequence[float] = ROUND) -> float:
 
 def colour_top(film: Film) -> float:
     """End of the colour scale: above the limits, and above 99.9% of what any state shows."""
-    limits = film.problem.limits.bounds - 1
+    limit = float(film.problem.kind.strains.max(initial=0.0))
     seen = max(float(np.quantile(strains, 0.999)) for strains in film.strains)
-    return nice_above(max(seen, 1.1 * float(limits.max()), 1e-6))
+    return nice_above(max(seen, 1.1 * limit, 1e-6))
 
 
 class Picture:
@@ -113,8 +113,10 @@ class Picture:
 
     def _limits(self, ax: Axes) -> None:
         """The limits on the colour scale, with their names beside it."""
-        bounds = self.film.problem.limits.bounds
-        limits = sorted({100 * (float(bounds.min()) - 1), 100 * (float(bounds.max()) - 1)})
+        strains = self.film.problem.kind.strains
+        if len(strains) == 0:
+            return
+        limits = sorted({100 * float(strains.min()), 100 * float(strains.max())})
         for limit in limits:
             ax.axhline(limit, color="white", linewidth=2.6)
             ax.axhline(limit, color=LIMIT_COLOUR, linewidth=1.4)

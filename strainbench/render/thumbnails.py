@@ -32,9 +32,12 @@ class Shot:
     settings: Sequence[str] = ("resolution=12",)
     steps: int | None = None  # None is as many as a run takes
     camera: Camera = field(default_factory=Camera)
+    solver: str = SOLVER
 
 
 SHOTS = {
+    "beam": Shot(("resolution=2", "step=0.02"), 25, Camera(20.0, 15.0), "lcp-qp"),
+    "beam-compress": Shot(("resolution=2", "alpha=2"), 60, Camera(30.0, 15.0), "lcp-qp"),
     "chainmail": Shot(("resolution=14",), 18),
     "collision": Shot(("resolution=20",), 28),
     "drape": Shot(("resolution=20",), 1, Camera(20.0, 10.0)),
@@ -63,8 +66,8 @@ def take(name: str, folder: Path) -> Path:
     shot = SHOTS.get(name, Shot())
     steps = shot.steps
     if steps is None:
-        steps = plan_one(name, SOLVER, shot.settings, 1, 1e-6).scenario.scenario().usual_steps
-    film = shoot(plan_one(name, SOLVER, shot.settings, steps, 1e-6), every=steps)
+        steps = plan_one(name, shot.solver, shot.settings, 1, 1e-6).scenario.scenario().usual_steps
+    film = shoot(plan_one(name, shot.solver, shot.settings, steps, 1e-6), every=steps)
     if film.stopped:
         raise ValueError(film.stopped)
     path = folder / f"{name}.png"

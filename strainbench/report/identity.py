@@ -118,6 +118,7 @@ LOOKS = {
         Look(Family.NLP, "ipopt", "#C04A00", _regular(3, radius=1.2)),
         Look(Family.NLP, "linearized-qp", "#7A4A12", _regular(3, 1 / 2, radius=1.2), (5, 2)),
         Look(Family.NLP, "ipopt-edges", "#E8923A", _regular(3, 1 / 4, radius=1.2), (2, 2)),
+        Look(Family.NLP, "lcp-qp", "#5C3A1E", _regular(3, 1 / 6, radius=1.2), (6, 2, 1, 2)),
         Look(Family.FIRST_ORDER, "admm", "#00786A", _arms(4, 0)),
         Look(Family.FIRST_ORDER, "dykstra", "#3DB79B", _arms(4, 1 / 8), (5, 2)),
         Look(Family.FIRST_ORDER, "augmented-lagrangian", "#6E9A1F", _arms(3, 1 / 2), (2, 2)),
@@ -126,6 +127,7 @@ LOOKS = {
         Look(Family.LOCAL, "fast-projection", "#E58AB4", DOME, (2, 2)),
         Look(Family.LOCAL, "gauss-seidel-strain", "#A9799A", _regular(5, 1 / 2), (6, 2, 1, 2)),
         Look(Family.LOCAL, "gauss-seidel-principal", "#D3AFC6", _regular(5, 1 / 4), (1, 2)),
+        Look(Family.LOCAL, "lcp-pgs", "#7B2D5B", _regular(6, 1 / 12), (1, 2)),
         Look(Family.NONE, "none", "#6F6F6F", BAR, (1, 3)),
     )
 }
@@ -143,6 +145,8 @@ VARIANTS = {
     "clarabel": ("default", "tight", "paper"),
     "linearized-qp": ("default", "plain"),
     "xpbd": ("20", "compliant"),
+    "lcp-pgs": ("literal", "biot"),
+    "lcp-qp": ("literal", "biot"),
 }
 """Those of one base that are to be told apart; of any other the sum over its name decides."""
 YOURS = Look(Family.YOURS, "", "#D0021B", STAR)

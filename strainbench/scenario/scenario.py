@@ -102,6 +102,21 @@ class Scenario(ABC):
         """Compile what `play` compiles on first use, off the clock."""
         next(replace(self, resolution=2).play(lambda target: target))
 
+    def frame(
+        self,
+        problem: Problem,
+        target: FloatArray,
+        start: FloatArray,  # noqa: ARG002
+    ) -> Problem:
+        """The projection of a candidate (n, 3) that a step from positions `start` has proposed.
+
+        Parameters
+        ----------
+        problem : the scene's own
+        start : (n, 3) the answer to the candidate before, at first the scene's positions [m]
+        """
+        return problem.with_target(target)
+
     def easier(self) -> Scenario | None:
         """The neighbour on which a failure here is checked; None where this one is easy itself."""
         return replace(self, limit=EASY_LIMIT) if self.limit < EASY_LIMIT else None

@@ -157,7 +157,7 @@ class Stage:
         with blamed(Who.SCENE):
             if not np.all(np.isfinite(target)):
                 raise StageError(Who.SCENE, "the simulation has left the finite numbers")
-            frame = self.problem.with_target(target)
+            frame = self.scenario.frame(self.problem, target, self.positions)
         with blamed(Who.SOLVER):
             begin = self.clock()
             solution = run_solver(self.solver, frame, self.state, self.tolerance, time_limit)

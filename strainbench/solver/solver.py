@@ -105,20 +105,25 @@ class Solver(ABC):
     A field `warm: bool = False` says that the method can start from the frame before, which it
     then keeps in its `state` (`strainbench.solver.memory`): `--start warm` sets it.
     `takes_exact` says that the method has a form for exact limits, `takes_lower` that it has one
-    for lower bounds, which are not convex; other kinds of limits name the declaration that they
-    need (`strainbench.problem.kinds`).
+    for lower bounds, which are not convex, `takes_principal` for limits on principal stretches,
+    `takes_metric` that it projects in any norm; other kinds of limits name the declaration that
+    they need (`strainbench.problem.kinds`).
     """
 
     name: ClassVar[str]
     variants: ClassVar[Mapping[str, Mapping[str, object]]] = {}
     takes_exact: ClassVar[bool] = False
     takes_lower: ClassVar[bool] = False
+    takes_principal: ClassVar[bool] = False
+    takes_metric: ClassVar[bool] = False
 
     def supports(self, problem: Problem) -> str | None:
         """None, or the reason why this method cannot take the problem."""
         for declaration, reason in problem.kind.needs.items():
             if not getattr(self, declaration, False):
                 return reason
+        if problem.metric is not None and not self.takes_metric:
+            return "it projects in norms of masses alone, not in that of a metric"
         return None
 
     def missing(self) -> str | None:

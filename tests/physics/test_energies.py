@@ -15,6 +15,7 @@ from strainbench.physics import energies
 from strainbench.physics.cloth import Cloth, Material
 from strainbench.physics.energies.bending import Bending, hinges
 from strainbench.physics.energies.contact import Contact, Floor, Penalty, Sphere
+from strainbench.physics.energies.corotational import Corotational
 from strainbench.physics.energies.energy import Energy
 from strainbench.physics.energies.membrane import Membrane
 from strainbench.physics.linear import symmetric
@@ -29,10 +30,13 @@ FLAT = np.insert(REST, 1, 0.0, axis=1)
 GRADIENTS, AREAS = shape_gradients(REST, ELEMENTS)
 VERTICES = np.arange(len(REST))[:, None]
 MASS = np.linspace(1.0, 2.0, len(REST))
+TETRAHEDRA = np.array([[0, 1, 3, 4], [1, 2, 4, 5], [4, 5, 7, 8]])  # of rest shapes of their own
+CORNERS = np.array([[0.0, 0, 0], [0.6, 0.1, 0], [0, 0.5, 0.2], [0.1, 0, 0.7]]) * np.ones((3, 1, 1))
 NO_PINS = np.array([], dtype=np.int64)
 
 ENERGIES = {
     "membrane": Membrane(ELEMENTS, GRADIENTS, 0.1 * AREAS, (2.0, 3.0)),
+    "corotational": Corotational(TETRAHEDRA, *shape_gradients(CORNERS, TETRAHEDRA), (2.0, 3.0)),
     "bending": Bending(*hinges(REST, ELEMENTS, AREAS)),
     "floor": Contact(7.0, 0.3, (Floor(-0.2),)).penalty(MASS),
     "sphere": Contact(7.0, 0.3, (Sphere((0.5, -0.2, 0.5), 0.4),)).penalty(MASS),
@@ -73,7 +77,9 @@ def test_every_energy_of_the_suite_is_in_the_list():
         for _, kind in inspect.getmembers(importlib.import_module(module), inspect.isclass)
         if issubclass(kind, Energy) and not inspect.isabstract(kind)
     }
-    assert {Membrane, Bending, Penalty} <= found <= {type(e) for e in ENERGIES.values()}
+    assert (
+        {Membrane, Corotational, Bending, Penalty} <= found <= {type(e) for e in ENERGIES.values()}
+    )
 
 
 def test_the_gradient_is_the_derivative_of_the_value(name, rng):

@@ -32,8 +32,10 @@ from strainbench.physics.energies.contact import Contact, Floor
 from strainbench.physics.implicit_euler import NewtonSettings, minimise_step
 from strainbench.referee.reference import reference_of
 from strainbench.scenario.cloth import ClothScenario
+from strainbench.scenario.registry import find_scenario, list_scenarios
 from strainbench.scenario.scenario import Scenario, SheetScenario
 from strainbench.scenario.stage import Stage, StageError, Who
+from strainbench.scenario.volume import VolumeScenario
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solver
 
@@ -75,6 +77,12 @@ class Row:
     time_share: float | None = None  # of a step with the part, in processor time
     added_nonzeros: int | None = None  # of the energy's Hessian, by the part
     verdict: str = ""
+
+
+def of_cloth() -> list[str]:
+    """Our scenes but those of volumes, whose limits the solvers of cloth do not take."""
+    names = (entry.name for entry in list_scenarios())
+    return [name for name in names if not issubclass(find_scenario(name), VolumeScenario)]
 
 
 def account(cell: Cell) -> Iterator[Row]:
