@@ -18,7 +18,6 @@ from strainbench import certify, solve
 from strainbench.bench.journal import FRAMES
 from strainbench.bench.judge import _missed
 from strainbench.bench.plan import plan
-from strainbench.bench.plan import plan
 from strainbench.referee.reference import reference_of
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.registry import find_scenario, list_scenarios
