@@ -11,7 +11,7 @@ from __future__ import annotations
 import shutil
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -122,28 +122,33 @@ class Runner:
 
     def run(self, cells: Sequence[Cell]) -> Summary:
         """Run what is not finished; KeyboardInterrupt passes through, with all results kept."""
+        return self.run_batches([cells])
+
+    def run_batches(self, batches: Iterable[Sequence[Cell]]) -> Summary:
+        """The same of several; each is judged and written before the next is asked for."""
+        begin = time.perf_counter()
         with locked(self.settings.folder):
             self._take_stock()
-            return self._run(cells)
+            shutil.rmtree(self.scratch, ignore_errors=True)
+            with fixed_threads(1), family() as ours:  # the referee's
+                self._nurseries = Nurseries(ours, self.scratch, self.settings.processes)
+                court = Court(ours, self.scratch, self._settle)
+                for cells in batches:
+                    self._run(ours, cells, court)
+            shutil.rmtree(self.scratch, ignore_errors=True)
+        self.summary.wall = time.perf_counter() - begin
+        return self.summary
 
-    def _run(self, cells: Sequence[Cell]) -> Summary:
-        begin = time.perf_counter()
+    def _run(self, ours: Family, cells: Sequence[Cell], court: Court) -> None:
         wanted = [cell for cell in cells if not self.is_finished(cell)]
-        for threads in {cell.threads for cell in wanted}:
+        for threads in {cell.threads for cell in wanted} - set(self._machines):
             self._machines[threads], facts = describe_machine(threads)
             remember_machine(self.settings.folder, self._machines[threads], facts)
         self.observer.planned(wanted, len(cells) - len(wanted))
-        shutil.rmtree(self.scratch, ignore_errors=True)
-        with fixed_threads(1), family() as ours:  # the referee's
-            self._nurseries = Nurseries(ours, self.scratch, self.settings.processes)
-            court = Court(ours, self.scratch, self._settle)
-            with court.in_session():
-                missing = self._missing_recordings(wanted)
-                self._play_all(ours, missing, self._keep_recording, court)
-                self._play_all(ours, wanted, court.take, court)
-        shutil.rmtree(self.scratch, ignore_errors=True)
-        self.summary.wall = time.perf_counter() - begin
-        return self.summary
+        with court.in_session():
+            missing = self._missing_recordings(wanted)
+            self._play_all(ours, missing, self._keep_recording, court)
+            self._play_all(ours, wanted, court.take, court)
 
     def _play_all(
         self,

@@ -17,8 +17,11 @@ import pytest
 from strainbench.bench.cell import Cell, PluginRef
 from strainbench.bench.machine import fixed_threads
 from strainbench.bench.nursery import CAN_FORK, LOST, Nursery, untouched_mb
+from strainbench.bench.plan import plan
 from strainbench.bench.preload import Nurseries, load_solver, load_suite
 from strainbench.bench.process import MARK, OUTPUT, family, spawned
+from strainbench.bench.records import latest_runs
+from strainbench.bench.runner import Runner, Settings
 from strainbench.scenario.registry import find_scenario
 from strainbench.solver.registry import find_solver
 
@@ -246,3 +249,26 @@ def test_a_nursery_that_died_is_planted_anew(tmp_path):
         code_of(first.child)
         assert nurseries.starter(cell).__self__ is not first
         assert Nurseries(ours, tmp_path / "b", "spawn").starter(cell) is spawned
+
+
+def test_batches_share_what_is_loaded(tmp_path, monkeypatch):
+    planted = []
+    plant = Nursery.planted.__func__
+
+    def counting(cls, family, folder, load, *args, **within):
+        planted.append(load)
+        return plant(cls, family, folder, load, *args, **within)
+
+    monkeypatch.setattr(Nursery, "planted", classmethod(counting))
+    settings = ["resolution=2"]
+    cells = plan(["stretch-square"], ["none"], settings, "simulate", 1, [1e-6, 1e-7], None)
+    seen = []
+
+    def batches():
+        for cell in cells:
+            yield [cell]
+            seen.append(latest_runs(tmp_path)[cell.key]["outcome"])
+
+    assert Runner(Settings(tmp_path)).run_batches(batches()).cells == 2
+    assert seen == ["violated", "violated"]
+    assert planted == [load_suite, load_solver]

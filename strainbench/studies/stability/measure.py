@@ -7,7 +7,7 @@ again, and `strainbench report` reads it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import nan
 from pathlib import Path
@@ -131,17 +131,21 @@ def measure(
     plan((len(x.words) - 1, len(y.words) - 1))  # words that are wrong fail here
     methods = list(plan((0, 0)))
     found = Map(x, y, {method: {} for method in methods})
-    while True:
-        asked = {(method, point) for method in methods for point in found.wanted(method)}
-        if not asked or time.monotonic() > until:
-            found.open = len(asked)
-            return found
-        batch = sorted(asked, key=lambda a: (a[1], a[0]))[:BATCH]
-        cells = {(method, point): plan(point)[method] for method, point in batch}
-        Runner(settings, observer).run(list(cells.values()))
-        spots = read_spots(settings.folder, [cell.key for cell in cells.values()])
-        for (method, point), cell in cells.items():
-            found.spots[method][point] = spots[cell.key]
+
+    def batches() -> Iterator[list[Cell]]:
+        while asked := {(method, point) for method in methods for point in found.wanted(method)}:
+            if time.monotonic() > until:
+                found.open = len(asked)
+                return
+            batch = sorted(asked, key=lambda a: (a[1], a[0]))[:BATCH]
+            cells = {(method, point): plan(point)[method] for method, point in batch}
+            yield list(cells.values())
+            spots = read_spots(settings.folder, [cell.key for cell in cells.values()])
+            for (method, point), cell in cells.items():
+                found.spots[method][point] = spots[cell.key]
+
+    Runner(settings, observer).run_batches(batches())
+    return found
 
 
 def lasting(cells: Sequence[Cell]) -> list[Cell]:
