@@ -15,8 +15,7 @@ TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipo
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test quick faults check coverage claims docs \
-	graph perf kernels report thumbnails clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick faults check coverage claims docs graph perf kernels report thumbnails clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)

@@ -8,7 +8,6 @@ import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.problem.grid import square_grid
-from strainbench.problem.limits import StretchLimits
 from strainbench.scenario.cloth import ClothScenario
 
 SIDE = 0.5  # [m]
@@ -40,12 +39,9 @@ class Swing(ClothScenario):
             valid = "an angle, or 0 with exact directions, is valid"
             raise ValueError(f"offset is {self.offset:g}: {valid}")
 
-    def limits(self) -> StretchLimits:
-        """The same bound in all sampled directions, turned by the offset."""
-        if not self.offset or isinstance(self.directions, str):
-            return super().limits()
-        angles = self.sampled_angles() + np.deg2rad(self.offset)
-        return StretchLimits.sampled(angles, np.full(self.directions, 1 + self.limit))
+    def sampled_angles(self) -> FloatArray:
+        """See the base class; turned by the offset."""
+        return super().sampled_angles() + np.deg2rad(self.offset)
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class."""

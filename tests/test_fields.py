@@ -212,7 +212,7 @@ def test_every_field_of_ours_is_documented():
 @pytest.mark.parametrize(
     ("scene", "units"),
     [
-        ("swing", {"step": "s"}),
+        ("swing", {"step": "s", "offset": "degrees"}),
         ("collision", {"step": "s", "stiffness": "N/m", "margin": "m", "floor": "m"}),
         ("flag", {"step": "s", "wind": "m/s", "drag": "N s/m^3"}),
         ("twist", {"turn_rate": "degrees/s", "step": "s"}),

@@ -45,6 +45,7 @@ class PrincipalLimits(Kind):
     --------
     A fibre stretched by 5% along an axis that is limited to 4%:
 
+    >>> import numpy as np
     >>> limits = PrincipalLimits("hyperbolic", (None, 0.96), (None, 1.04))
     >>> F = np.array([[[1.0, 0.0], [0.0, 1.05], [0.0, 0.0]]])
     >>> float(limits.values(F).min().round(12))

@@ -150,7 +150,7 @@ class Scenario(ABC):
         return {f.name: getattr(self, f.name) for f in fields(self)}
 
     def sampled_angles(self) -> FloatArray:
-        """(directions,) equally spaced in [-pi/2, pi/2) [rad], for limits given by a curve."""
+        """(directions,) equally spaced in [-pi/2, pi/2) [rad]."""
         if isinstance(self.directions, str):
             raise ValueError(f"directions is exact: {self.name} samples a curve of limits")
         return -np.pi / 2 + np.pi * np.arange(self.directions) / self.directions
@@ -174,7 +174,8 @@ class Scenario(ABC):
         """The same bound in all directions."""
         if isinstance(self.directions, str):
             return StretchLimits.exact(1 + self.limit)
-        return StretchLimits.isotropic(1 + self.limit, self.directions)
+        bounds = np.full(self.directions, 1 + self.limit)
+        return StretchLimits.sampled(self.sampled_angles(), bounds)
 
     def curve(self) -> tuple[FloatArray, FloatArray] | None:
         """Angles (a,) [rad] and bounds (a,) of the curve that `limits` samples, for polar plots.

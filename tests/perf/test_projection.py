@@ -29,6 +29,8 @@ def frame(request):
 def test_projection(benchmark, frame, name):
     benchmark.group, frame = frame
     solver = find_solver(name)
+    if refusal := solver.supports(frame):
+        pytest.skip(refusal)
     warm_up(solver, frame, TOLERANCE)
     state = solver.prepare(frame)
     solution = benchmark.pedantic(

@@ -304,7 +304,7 @@ def test_what_is_no_answer_has_a_reason_and_no_numbers(case):
     assert certificate.reason
     assert words in certificate.reason
     floats = [getattr(certificate, f.name) for f in fields(certificate) if f.type == "float"]
-    assert len(floats) == 10
+    assert len(floats) == 11
     assert np.isnan(floats).all()
 
 

@@ -84,9 +84,8 @@ def test_the_stage_and_the_judge_see_the_same_frames(tmp_path):
         for frame, answer in zip(frames, answers, strict=True):
             np.save(file, frame.target)
             np.save(file, answer)
-    for frame, answer, found in zip(
-        frames, answers, _certificates(cell, tmp_path, 3, None), strict=True
-    ):
+    certificates, _ = _certificates(cell, tmp_path, 3, None)
+    for frame, answer, found in zip(frames, answers, certificates, strict=True):
         assert found.objective == pytest.approx(frame.objective(answer), rel=1e-12)
     assert frames[2].objective(answers[2]) > 0
     np.testing.assert_array_equal(frames[2].linearise_at, answers[1])
