@@ -32,6 +32,7 @@ from strainbench.cli.overview import Verbs
 from strainbench.cli.pictures import draw_polar, render_scene
 from strainbench.cli.report import compare_results, report_results
 from strainbench.cli.run import run_cells
+from strainbench.cli.sensitivity import measure_sensitivity
 from strainbench.cli.stability import draw_map
 from strainbench.cli.studies import follow_solvers, keep_ledger, let_duel
 from strainbench.escape import terminal
@@ -91,6 +92,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "testset": make_test_set,
     "ledger": keep_ledger,
     "map": draw_map,
+    "sensitivity": measure_sensitivity,
     "render": render_scene,
     "polar": draw_polar,
     "claims": audit_claims,
