@@ -37,11 +37,21 @@ field: setup ## every method on the same frames: swing at 20 and 40 cells, 1%; h
 		--time-limit 60 --results $(FIELD)
 	$(BIN)/strainbench report --results $(FIELD)
 
-failures: setup ## where methods fail: hard cases beside easier neighbours; an hour, resumable
+failures: setup ## where methods fail: hard cases beside easier neighbours; hours, resumable
 	$(BIN)/strainbench run twist $(HARD) --set turn_rate=1200,300 --steps 1
 	$(BIN)/strainbench run stress $(HARD) --set case=slivers,mass-ratio,displaced \
 		--set severity=1,0.1 --steps 1
+	$(BIN)/strainbench run stress $(HARD) --set case=slivers,displaced --set severity=3 --steps 1
+	$(BIN)/strainbench run stress $(HARD) --set case=mass-ratio --set severity=2 --steps 1
 	$(BIN)/strainbench run stress $(HARD) --set case=fast-pins --set severity=1,0.1 --steps 3
+	$(BIN)/strainbench run stress $(HARD) --set case=pulled-pins --set severity=1,0.1 --steps 4
+	$(BIN)/strainbench run stress $(HARD) --set case=collapsed,flattened,inverted \
+		--set severity=1,0.1 --steps 1
+	$(BIN)/strainbench run stress $(HARD) --set severity=1,0.1 --steps 1 \
+		--set case=shuffled,rotated,millimetres,kilometres,far
+	$(BIN)/strainbench run stress $(HARD) --set case=displaced --set severity=0.1 \
+		--set limit=0.01%,0 --steps 1
+	$(BIN)/strainbench run spike $(HARD) --set severity=1,0.1 --steps 60
 	$(BIN)/strainbench run stretch-square $(HARD) --set scale_x=2,1.1 --steps 1
 	$(BIN)/strainbench run swing $(HARD) --set limit=1%,0.1%,0.01% --steps 10 --mode replay
 	$(BIN)/strainbench report --results $(FAILURES)

@@ -61,7 +61,7 @@ def test_playing_twice_gives_the_same_candidates(scene):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("resolution", 0), ("limit", 0.0), ("limit", 1.01), ("directions", 0)]
+    ("key", "value"), [("resolution", 0), ("limit", -0.01), ("limit", 1.01), ("directions", 0)]
 )
 def test_wrong_values_are_named(scene, key, value):
     with pytest.raises(ValueError, match=f"{key} is {value}"):

@@ -33,6 +33,7 @@ from strainbench.cli.overview import Verbs
 from strainbench.cli.pictures import draw_polar, render_scene
 from strainbench.cli.report import compare_results, report_results
 from strainbench.cli.run import run_cells
+from strainbench.cli.sensitivity import measure_sensitivity
 from strainbench.cli.stability import draw_map
 from strainbench.cli.studies import compare_steps, follow_solvers, keep_ledger, let_duel
 from strainbench.escape import terminal
@@ -94,6 +95,7 @@ VERBS: dict[str, Callable[..., None]] = {
     "step": compare_steps,
     "map": draw_map,
     "explain": explain_cell,
+    "sensitivity": measure_sensitivity,
     "render": render_scene,
     "polar": draw_polar,
     "claims": audit_claims,

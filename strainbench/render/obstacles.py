@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from strainbench.arrays import FloatArray, IntArray
-from strainbench.physics.energies.contact import Floor, Obstacle, Sphere
+from strainbench.physics.energies.contact import Floor, Obstacle, Rod, Sphere
 
 TURNS = 96  # meridians of a sphere: within 0.05% of its radius
 PIN_TURNS = 16
@@ -19,9 +19,11 @@ def patches(obstacles: Sequence[Obstacle], cloth: FloatArray) -> tuple[FloatArra
 
     Parameters
     ----------
-    cloth : (n, 3) positions over all states [m]: a floor reaches a little beyond them
+    cloth : (n, 3) positions over all states [m]: a floor reaches a little beyond them, a rod down
+        to the lowest
     """
     grids = [ball(np.array(o.centre), o.radius) for o in obstacles if isinstance(o, Sphere)]
+    grids += [_rod(o, cloth) for o in obstacles if isinstance(o, Rod)]
     grids += [_tile(o, cloth) for o in obstacles if isinstance(o, Floor)]
     return together(grids)
 
@@ -47,6 +49,13 @@ def ball(centre: FloatArray, radius: float, turns: int = TURNS) -> FloatArray:
     height = np.broadcast_to(np.cos(theta), (len(theta), len(phi)))
     unit = np.stack([np.sin(theta) * np.sin(phi), height, np.sin(theta) * np.cos(phi)], axis=-1)
     return centre + radius * unit
+
+
+def _rod(rod: Rod, cloth: FloatArray) -> FloatArray:
+    """A ball whose lower half is drawn down to the lowest cloth."""
+    points = ball(np.array(rod.tip), rod.radius, PIN_TURNS)
+    points[points[..., 1] < rod.tip[1], 1] = min(cloth[:, 1].min(), rod.tip[1])
+    return points
 
 
 def _tile(floor: Floor, cloth: FloatArray) -> FloatArray:

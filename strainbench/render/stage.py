@@ -49,5 +49,5 @@ def facing(seen: FloatArray, faces: IntArray) -> IntArray:
     """(f, 3) the same, turned round where a surface `seen` (n, 3) shows mostly its back."""
     a, b, c = np.moveaxis(seen[faces], 1, 0)
     normals = np.cross(b - a, c - a)
-    net = normals[:, 2].sum() / np.linalg.norm(normals, axis=1).sum()
-    return faces[:, ::-1] if net < -1e-6 else faces  # 0 of what is closed
+    least = 1e-6 * np.linalg.norm(normals, axis=1).sum()  # 0 is the net of what is closed
+    return faces[:, ::-1] if normals[:, 2].sum() < -least else faces

@@ -43,6 +43,7 @@ SHOTS = {
     "drape": Shot(("resolution=20",), 1, Camera(20.0, 10.0)),
     "flag": Shot(("resolution=14",), 60),
     "garment": Shot(("resolution=8",), 15),
+    "spike": Shot(("resolution=20",), 75),
     "sphere-drop": Shot(("resolution=20",), 36),
     "stretch-square": Shot(("resolution=10",), 1, Camera(0.0, 0.0)),
     "swing": Shot(("resolution=16",), 15),

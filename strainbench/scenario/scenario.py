@@ -65,7 +65,7 @@ class Scenario(ABC):
     Parameters
     ----------
     resolution : cells a side.
-    limit : largest strain allowed; 0.01 is 1%.
+    limit : largest strain allowed; 0.01 is 1%, and 0 lets nothing stretch at all.
     directions : sampled directions an element, or "exact" for a limit on the largest singular
         value.
     """
@@ -82,9 +82,10 @@ class Scenario(ABC):
     def __post_init__(self) -> None:
         if self.resolution < 1:
             raise ValueError(f"resolution is {self.resolution}: a whole number above 0 is valid")
-        if not 0 < self.limit < 1:
+        if not 0 <= self.limit < 1:
             raise ValueError(
-                f"limit is {self.limit}: a strain between 0 and 1 is valid, 0.01 or 1% for 1%"
+                f"limit is {self.limit}: a strain between 0 and 1 is valid, 0.01 or 1% for 1%, "
+                f"0 for no stretch"
             )
         if self.directions != "exact" and (isinstance(self.directions, str) or self.directions < 1):
             valid = "a whole number above 0, or exact, is valid"

@@ -50,6 +50,10 @@ class StageError(ValueError):
         self.who, self.reason = who, reason
 
 
+class NoAnswerError(StageError):
+    """Positions that are not finite: a scene may catch it, and go on without them."""
+
+
 @dataclass(frozen=True, eq=False)
 class Projection:
     """A candidate, and what a solver made of it.
@@ -167,7 +171,8 @@ class Stage:
     def accept(self, projection: Projection) -> FloatArray:
         """The answer (n, 3) for the scene to go on from, its own."""
         if projection.fault:
-            raise StageError(Who.SOLVER, projection.fault)
+            kind = NoAnswerError if projection.fits else StageError
+            raise kind(Who.SOLVER, projection.fault)
         answer = projection.solution.positions
         self.frame, self.positions = projection.frame, read_only(answer.copy())
         return answer.copy()

@@ -33,6 +33,7 @@ VERBS = {
     "ledger": ["swing", *SMALL, "--steps", "1"],
     "step": ["swing", *SOLVER, *SMALL],
     "map": ["swing", "--solver", "none", "--x", "limit=1%,2%", "--y", "step=0.01,0.02"],
+    "sensitivity": ["swing", *SOLVER, *SMALL, "--frame", "1", "--draws", "1"],
     "profile": ["swing", *SOLVER, *SMALL, "--frame", "1"],
     "check": ["none"],
     "testset": ["d", "--small"],
@@ -58,7 +59,7 @@ SETTING = [
     "resolution=nan",
     "resolution=100000",
     "resolution=99999999999999999999",
-    "limit=0",
+    "limit=-0.01",
     "limit=-1%",
     "limit=nan",
     "limit=inf",
@@ -75,6 +76,7 @@ SETTING = [
 FEW_SETTINGS = ["", "x", "colour=2", "resolution=0", "resolution=100000", "limit=nan"]
 NONSENSE = {
     **dict.fromkeys(["--steps", "--jobs", "--threads", "--every", "--repeats"], WHOLE),
+    "--draws": WHOLE,
     "--frame": WHOLE,
     **dict.fromkeys(["--duration", "--time-limit", "--memory-limit"], NUMBER),
     "--tolerance": NUMBER,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strainbench.physics.cloth import Cloth, Material
-from strainbench.physics.energies.contact import Contact, Floor, Penalty, Sphere
+from strainbench.physics.energies.contact import Contact, Floor, Penalty, Rod, Sphere
 from strainbench.physics.implicit_euler import NewtonSettings, minimise_step
 from strainbench.physics.pattern import Pattern
 from strainbench.problem.grid import square_grid
@@ -14,6 +14,7 @@ from tests.problems import central_difference, hessian
 
 SPHERE = Sphere((0.1, -0.2, 0.3), 0.25)
 FLOOR = Floor(-0.1)
+ROD = Rod((0.1, -0.2, 0.3), 0.25)
 SEEDS = range(4)
 OBSTACLES = [(SPHERE,), (FLOOR,), (SPHERE, FLOOR)]
 
@@ -45,7 +46,7 @@ def hessian_blocks(c, x, k):
 
 
 def test_distances_are_signed_lengths_along_unit_normals(rng):
-    for obstacle in (SPHERE, FLOOR):
+    for obstacle in (SPHERE, FLOOR, ROD):
         x = points(rng)
         d, n = obstacle.distances(x)
         assert d.min() < 0 < d.max()
@@ -54,7 +55,7 @@ def test_distances_are_signed_lengths_along_unit_normals(rng):
         np.testing.assert_allclose(obstacle.distances(surface)[0], 0, atol=1e-14)
 
 
-@pytest.mark.parametrize("obstacles", OBSTACLES)
+@pytest.mark.parametrize("obstacles", [*OBSTACLES, (ROD,)])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_gradient_is_the_derivative_of_the_energy(obstacles, seed):
     rng = np.random.default_rng(seed)

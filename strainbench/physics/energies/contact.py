@@ -1,9 +1,9 @@
-"""Vertices kept off a sphere or a floor by penalties (Tang et al. 2022, Fig. 6).
+"""Vertices kept off spheres, rods and floors by penalties (Tang et al. 2022, Fig. 6).
 
 A vertex at the signed distance d below a margin d_0 stores 1/2 k (d_0 - d)^2. With the outward
 normal n = grad(d), its gradient is -k (d_0 - d) n. Its Hessian is k n n^T - k (d_0 - d) grad(n); a
 sphere's grad(n) = (1 - n n^T) / r has no negative eigenvalue, so k n n^T is the nearest positive
-semidefinite matrix, and all there is for a floor.
+semidefinite matrix, all there is for a floor, and what is kept for a rod.
 """
 
 from __future__ import annotations
@@ -41,6 +41,21 @@ class Sphere:
         r = np.linalg.norm(offset, axis=1)
         normals = np.divide(offset, r[:, None], out=np.tile(UP, (len(x), 1)), where=r[:, None] > 0)
         return r - self.radius, normals
+
+
+@dataclass(frozen=True)
+class Rod:
+    """An upright rod at rest, its round end around `tip` (3,) [m], of `radius` [m]."""
+
+    tip: tuple[float, float, float]
+    radius: float
+
+    def distances(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """See `Obstacle`: those of a ball as high as the point, up to the tip."""
+        ball = Sphere((0, 0, 0), self.radius)
+        offset = x - np.array(self.tip)
+        offset[:, 1] = np.maximum(offset[:, 1], 0)
+        return ball.distances(offset)
 
 
 @dataclass(frozen=True)
