@@ -11,6 +11,7 @@ from strainbench.progress import Track, untracked
 from strainbench.report.charts import draw_charts
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
+from strainbench.report.local import local_table
 from strainbench.report.page import report_page
 from strainbench.report.paper import as_latex, chosen_methods
 from strainbench.report.runs import load_runs
@@ -37,6 +38,8 @@ def write_report(folder: Path, track: Track = untracked) -> list[Path]:
         texts["failures.md"] = markdown(failures_document(failed, runs, machines))
     if (energy := energy_table(folder, runs)).lines:
         texts["energy.md"] = markdown(energy)
+    if (local := local_table(folder, runs)).lines:
+        texts["local.md"] = markdown(local)
     files = [*texts, *(path.name for path in charts)]
     texts["index.html"] = report_page(folder, runs, failed, machines, files, track)
     for name, text in texts.items():
