@@ -1,10 +1,9 @@
 """Sequential convex programming within cuts (Kovalsky et al. 2014; Wang et al. 2016).
 
 S. Kovalsky, N. Aigerman, R. Basri, Y. Lipman, "Controlling singular values with semidefinite
-programming", ACM Trans. Graph. 33(4), 2014; and for limits on stretch and compression H. Wang et
-al. 2016. Lower bounds on stretch are not convex. At positions x_k within the limits they are
-replaced by convex ones that are stricter and touch them at x_k (`solvers.sequential_cuts.cuts`);
-the projection under these, a cone program, is x_{k+1}.
+programming", ACM Trans. Graph. 33(4), 2014. Lower bounds on stretch are not convex. At positions
+x_k within the limits they are replaced by convex ones that are stricter and touch them at x_k
+(`solvers.sequential_cuts.cuts`); the projection under these, a cone program, is x_{k+1}.
 
 x_k is itself admissible to that program, so that the objective never rises, and every iterate is
 within the limits. Restrictions and limits have the same gradients at x_k: where the positions
@@ -40,7 +39,8 @@ class SequentialCuts(Solver):
     | status | when |
     |---|---|
     | solved | positions rest, within the limits |
-    | iteration limit, time limit | they do not yet; they are within the limits all the same |
+    | iteration limit | they do not yet; they are within the limits all the same |
+    | time limit | the same, or no start came within the limits in time |
     | stalled | a round gains nothing, and the KKT conditions do not hold |
     | no start within the limits | nothing within them was found; perhaps there is nothing |
 

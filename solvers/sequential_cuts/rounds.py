@@ -82,6 +82,8 @@ class Run:
         return self._solution(program, x, answer, status, rounds)
 
     def _ending(self, program: Program, x: FloatArray, answer: Answer, still: bool) -> str:
+        if answer.status == "MaxTime":  # its duals are no multipliers yet
+            return "time limit"
         if still or program.residual(self.problem, x, answer.duals) <= STATIONARY:
             return "solved"
         return "time limit" if self.limit.deadline.passed else "stalled"

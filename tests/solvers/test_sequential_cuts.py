@@ -149,6 +149,15 @@ def test_it_stops_where_it_is_told_to():
     assert pulled(4).violations(found.positions).max() <= 1e-6
 
 
+def test_the_clock_ends_it_within_the_limits():
+    problem = pulled(10)
+    solver = SequentialCuts(starts=("accordion",))
+    for limit in (1e-3, 0.05):
+        found = run_solver(solver, problem, solver.prepare(problem), 1e-6, limit)
+        assert found.status in ("time limit", "solved")
+        assert problem.violations(found.positions).max() <= 1e-6
+
+
 # --- starts
 
 
