@@ -87,7 +87,7 @@ class SequentialCuts(Solver):
         if problem.rest.shape[-1] != 2:
             return "restriction=polar is that of triangles: rows is valid"
         lower = problem.lower_bounds.reshape(len(problem.elements), -1)
-        if np.ptp(lower, axis=1).any():
+        if lower.shape[1] == 1 or np.ptp(lower, axis=1).any():
             return "restriction=polar has one lower bound for all directions: rows is valid"
         return None
 

@@ -135,12 +135,22 @@ def test_the_best_of_all_starts_is_the_answer():
 
 
 def test_the_referee_calls_the_answer_local():
-    pytest.importorskip("cyipopt")
     problem = pulled(4)
     found = certify(problem, solve(problem, "sequential-cuts").positions)
     assert found.outcome == "feasible"
     assert "at best a local optimum" in found.reason
     assert found.objective == pytest.approx(found.best_known, rel=1e-9)
+
+
+def test_a_flat_answer_is_above_the_best_that_is_known():
+    problem = pulled(4)
+    flat = np.column_stack([problem.rest, np.zeros(problem.vertices)])
+    program = Program(problem, RESTRICTIONS["rows"](problem), slack=False)
+    for _ in range(2):
+        flat = program.solve(problem, flat, 1e-6, Clock()).positions
+    found = certify(problem, flat)
+    assert found.reason.startswith("at best a local optimum")
+    assert found.best_known < 0.95 * found.objective
 
 
 def test_it_stops_where_it_is_told_to():
