@@ -41,7 +41,8 @@ class Swing(ClothScenario):
 
     def sampled_angles(self) -> FloatArray:
         """See the base class; turned by the offset."""
-        return super().sampled_angles() + np.deg2rad(self.offset)
+        angles: FloatArray = super().sampled_angles() + np.deg2rad(self.offset)
+        return angles
 
     def sheet(self) -> tuple[FloatArray, IntArray, FloatArray, IntArray]:
         """See the base class."""

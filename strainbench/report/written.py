@@ -16,6 +16,7 @@ from strainbench.report.charts import Target, chart_sheets, work_precision
 from strainbench.report.drawing import drawn_beside
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
+from strainbench.report.local import local_table
 from strainbench.report.page import report_page
 from strainbench.report.page.drawn import Speed
 from strainbench.report.paper import as_latex, chosen_methods
@@ -56,6 +57,8 @@ def _texts(
         texts["failures.md"] = markdown(failures_document(failed, runs, machines))
     if (energy := energy_table(folder, runs)).lines:
         texts["energy.md"] = markdown(energy)
+    if (local := local_table(folder, runs)).lines:
+        texts["local.md"] = markdown(local)
     files = [*texts, *charts]
     texts["index.html"] = report_page(folder, runs, failed, machines, files, speed, track)
     return texts

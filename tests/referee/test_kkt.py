@@ -156,7 +156,7 @@ TAKEN = [
 
 
 def test_only_methods_with_a_form_for_lower_bounds_take_them():
-    assert {"ipopt", "gauss-seidel", "none"} >= set(TAKEN) - {
+    assert {"ipopt", "gauss-seidel", "sequential-cuts", "none"} >= set(TAKEN) - {
         "ipopt-default",
         "ipopt-default-lbfgs",
     }

@@ -19,12 +19,13 @@ from strainbench.report import warm
 from strainbench.report.charts import scores
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
+from strainbench.report.local import local_table
 from strainbench.report.machine import machine_section
 from strainbench.report.page.drawn import Drawn, Speed, drawings_of
 from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import LOCAL, OLDER, details, ledger_table, older, reasons
 
-OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md"}
+OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md", "local.md"}
 HEAVY = 1_500_000  # bytes of a folder's pictures that stand in the page; the others are linked
 NOTE = """\
 ✓ optimal on every step (violation at most {violation}, relative gap at most {gap}); ○ within the
@@ -144,6 +145,7 @@ def _protocol(folder: Path, runs: pd.DataFrame, machines: Machines) -> Markup:
             html(machine_section(machines), 3),
             _folded(kept.title, kept.parts),
             _folded("Inside the solve, means", details(runs).parts),
+            _folded("Answers under lower bounds", [local_table(folder, runs)]),
             _folded("Model ledger", [ledger_table(runs)]),
             _folded("Rows that newer ones stand for", [_superseded(folder, runs)]),
             *(_text(path) for path in sorted(folder.glob("*.md")) if path.name not in OURS),

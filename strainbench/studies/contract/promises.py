@@ -53,6 +53,8 @@ TO_OPTIMALITY = (
     "linearized-qp",
     "newton-ipm",
     "qoco",
+    "sequential-cuts",
+    "sequential-cuts-polar",
 )
 """Solvers of the projection itself; the others stop at a point within the limits."""
 UNSCALED = (
