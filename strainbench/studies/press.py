@@ -25,7 +25,7 @@ ABOUT = (
     "The scene `finger` by lcp-pgs, steps of 5 ms: the normal force on the table at a depth, with "
     "limits by axis and alike in all. Flat they are one material; on the side and on the tip the "
     "limits by axis soon make it rigid. Where sweeps have not converged no step within the limits "
-    "may be left, and the force grows with the sweeps that are allowed: it says rigid, no more. The "
+    "may be left, and the force grows with the sweeps that are allowed: rigid, it says. The "
     "violation is that of the limits themselves, after linearised steps."
 )
 COLUMNS = (
@@ -58,8 +58,9 @@ class Press:
 
 def pressed(press: str, material: str, friction: float, depths: Sequence[float]) -> Iterator[Press]:
     """Rows at depths [mm], of one play."""
-    given = {"press": press, "material": material, "friction": friction}
-    scene = find_scenario("finger")(**given, depth=1e-3 * max(depths))  # type: ignore[arg-type]
+    given: dict[str, object] = {"press": press, "material": material, "friction": friction}
+    given["depth"] = 1e-3 * max(depths)
+    scene = find_scenario("finger")(**given)  # type: ignore[arg-type]
     assert isinstance(scene, VolumeScenario)
     stage, details = Stage.opened(scene, find_solver("lcp-pgs")), dict[str, float]()
 
@@ -72,17 +73,18 @@ def pressed(press: str, material: str, friction: float, depths: Sequence[float])
         for depth in depths:
             if abs(report.time * SPEED - depth) > 1e-6 * depth:
                 continue
-            counts = (int(details[name]) for name in ("rows", "contacts", "sweeps"))
             yield Press(
                 press,
                 material,
                 friction,
                 depth,
-                details["push"] / scene.step**2,
-                *counts,
-                details["cone_error"],
-                float(stage.problem.violations(stage.positions).max()),
-                "no" if details["unconverged"] else "yes",
+                force=details["push"] / scene.step**2,
+                rows=int(details["rows"]),
+                contacts=int(details["contacts"]),
+                sweeps=int(details["sweeps"]),
+                cone_error=details["cone_error"],
+                violation=float(stage.problem.violations(stage.positions).max()),
+                converged="no" if details["unconverged"] else "yes",
             )
 
 
