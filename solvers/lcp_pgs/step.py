@@ -217,7 +217,8 @@ class LinearComplementarity(Solver):
             step = Linearised(problem, self.rows)
         x, chosen = step.positions(step.proposed), self._flagged(step)
         if len(chosen) == 0 or len(problem.free) == 0:
-            return Solution(x, "nothing near a limit", 0, details={"rows": 0.0})
+            details = {"rows": 0.0, "unconverged": 0.0, **Forces.none(step).told()}
+            return Solution(x, "nothing near a limit", 0, details=details)
         with section("factorise"):
             inverse = scipy.sparse.linalg.splu(
                 step.A, "MMD_AT_PLUS_A", options={"SymmetricMode": True}
