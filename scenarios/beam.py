@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from strainbench.arrays import FloatArray, IntArray
 from strainbench.physics.solid import Solid, SolidMaterial
 from strainbench.problem.grid import box_grid
 from strainbench.problem.principal import PrincipalLimits
 from strainbench.scenario.volume import VolumeScenario
+from strainbench.scenario.volumefile import read_volume
 
 LENGTH, WIDTH = 1.0, 0.2  # [m]
 YOUNG = {"stiff": 2e5, "anisotropic": 5e3, "isotropic": 5e3}  # [Pa]
@@ -32,6 +34,8 @@ class Beam(VolumeScenario):
     kind : of the anisotropic limits: hyperbolic, orthogonal, linear or ellipsoid.
     young : Young's modulus [Pa]; if not given, that of the material.
     alpha : damping by masses [1/s].
+    path : a file of tetrahedra in place of the beam (Gmsh, VTU, MEDIT ...), in metres, fixed where
+        its x is least; `resolution` then has no meaning.
     """
 
     name = "beam"
@@ -43,6 +47,7 @@ class Beam(VolumeScenario):
     alpha: float = None  # type: ignore[assignment]
     material: str = "anisotropic"
     kind: str = "hyperbolic"
+    path: str = ""
 
     def __post_init__(self) -> None:
         if self.material not in YOUNG:
@@ -52,10 +57,13 @@ class Beam(VolumeScenario):
         if self.alpha is None:
             object.__setattr__(self, "alpha", 2.0 if self.integrator == "linearised" else 0.0)
         super().__post_init__()
+        if self.path:
+            _ = self._body  # a bad file is named before anything runs
 
     def solid(self) -> Solid:
         """The beam along the x axis, fixed at x = 0."""
-        return box(self, (5 * self.resolution, self.resolution, self.resolution), axis=0)
+        cells = 5 * self.resolution, self.resolution, self.resolution
+        return beam(self, *(read_volume(self.path) if self.path else box(cells, 0)), axis=0)
 
     def principal(self) -> PrincipalLimits:
         """Those of the material."""
@@ -67,10 +75,15 @@ class Beam(VolumeScenario):
         return PrincipalLimits(self.kind, (None, lower, lower), (None, upper, upper))
 
 
-def box(scene: VolumeScenario, cells: tuple[int, int, int], axis: int) -> Solid:
-    """A beam of so many cells, its length along an axis, fixed where that is 0."""
+def box(cells: tuple[int, int, int], axis: int) -> tuple[FloatArray, IntArray]:
+    """The beam's mesh, of so many cells, its length along an axis."""
     size = np.full(3, WIDTH)
     size[axis] = LENGTH
-    rest, elements = box_grid(cells, size)
+    return box_grid(cells, size)
+
+
+def beam(scene: VolumeScenario, rest: FloatArray, elements: IntArray, axis: int) -> Solid:
+    """A body of a scene's material, fixed where an axis is least."""
     material = SolidMaterial(scene.young, alpha=scene.alpha, beta=scene.beta)
-    return Solid(rest, elements, material, np.flatnonzero(rest[:, axis] == 0))
+    along = rest[:, axis] - rest[:, axis].min()
+    return Solid(rest, elements, material, np.flatnonzero(along <= 1e-9 * along.max()))

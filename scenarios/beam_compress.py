@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scenarios.beam import box
+from scenarios.beam import beam, box
 from strainbench.physics.solid import Solid
 from strainbench.problem.principal import PrincipalLimits
 from strainbench.scenario.volume import VolumeScenario
@@ -32,7 +32,8 @@ class BeamCompress(VolumeScenario):
 
     def solid(self) -> Solid:
         """The beam along the y axis, fixed at y = 0."""
-        return box(self, (self.resolution, 5 * self.resolution, self.resolution), axis=1)
+        cells = self.resolution, 5 * self.resolution, self.resolution
+        return beam(self, *box(cells, 1), axis=1)
 
     def principal(self) -> PrincipalLimits:
         """On the z axis alone, unless they are isotropic."""

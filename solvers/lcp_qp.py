@@ -63,5 +63,5 @@ class LcpQp(LinearComplementarity):
         if "PrimalInfeasible" in status:
             return Answer(np.full(P.shape[0], np.nan), rows.l, found.iterations, "infeasible")
         d = step.proposed + edge * np.array(found.x)
-        multipliers = mean * edge * np.array(found.z)
+        multipliers = mean * edge**2 * np.array(found.z)
         return Answer(d, multipliers, found.iterations, "" if status == "Solved" else status)

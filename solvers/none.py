@@ -17,6 +17,8 @@ class NoProjection(Solver):
     takes_lower = True
     takes_principal = True
     takes_metric = True
+    takes_contact = True
+    takes_friction = True
 
     def solve(
         self,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray, frozen_array, index_array
+from strainbench.problem.contact import Plane, checked_contact
 
 
 def checked_rest(rest: ArrayLike) -> FloatArray:
@@ -67,6 +70,19 @@ def checked_mass(mass: ArrayLike, vertices: int) -> FloatArray:
     for vertex in np.flatnonzero(array <= 0)[:1]:
         raise ValueError(f"mass[{vertex}] is {array[vertex]}: a mass must be above 0")
     return array
+
+
+def put_step(
+    problem: Any, metric: Any, linearise_at: ArrayLike | None, contact: Sequence[Plane]
+) -> None:
+    """Keep what differs between the steps of a scene, checked, where it is given."""
+    put, n = partial(object.__setattr__, problem), problem.vertices
+    if metric is not None:
+        put("metric", checked_metric(metric, n))
+    if linearise_at is not None:
+        put("linearise_at", checked_target(linearise_at, n, "linearise_at"))
+    if len(contact):
+        put("contact", checked_contact(contact))
 
 
 SYMMETRIC = 1e-10

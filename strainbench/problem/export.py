@@ -159,6 +159,8 @@ def as_npz(problem: Problem, about: str) -> bytes:
 def _check_norm(problem: Problem, kind: str) -> None:
     if problem.metric is not None:
         raise ValueError(f"--format {kind}: files hold norms of masses alone, not a metric")
+    if problem.contact:
+        raise ValueError(f"--format {kind}: files hold limits alone, not contact with planes")
 
 
 def _limits(limits: object) -> dict[str, object]:

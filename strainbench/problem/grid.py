@@ -70,3 +70,23 @@ def box_grid(cells: tuple[int, int, int], size: FloatArray) -> tuple[FloatArray,
     volumes = np.linalg.det(rest[elements[:, 1:]] - rest[elements[:, :1]])
     elements[volumes < 0] = elements[volumes < 0][:, [0, 2, 1, 3]]
     return rest, elements
+
+
+EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
+EIGHTH = (
+    *((0, 4, 5, 6), (4, 1, 7, 8), (5, 7, 2, 9), (6, 8, 9, 3)),
+    *((4, 5, 6, 8), (4, 5, 8, 7), (5, 6, 8, 9), (5, 7, 9, 8)),
+)
+"""A tetrahedron's eighths, by its corners 0 to 3 and the middles 4 to 9 of its edges."""
+
+
+def halved(rest: FloatArray, elements: IntArray) -> tuple[FloatArray, IntArray]:
+    """Each tetrahedron (e, 4) cut into eight at the middles of its edges; shapes stay."""
+    edges = np.sort(elements[:, EDGES].reshape(-1, 2), axis=1)
+    ends, number = np.unique(edges, axis=0, return_inverse=True)
+    nodes = np.concatenate([elements, len(rest) + number.reshape(-1, 6)], axis=1)
+    finer = nodes[:, EIGHTH].reshape(-1, 4)
+    rest = np.concatenate([rest, rest[ends].mean(axis=1)])
+    volumes = np.linalg.det(rest[finer[:, 1:]] - rest[finer[:, :1]])
+    finer[volumes < 0] = finer[volumes < 0][:, [0, 2, 1, 3]]
+    return rest, finer

@@ -11,6 +11,7 @@ the columns of F_e D, and the largest singular value of these together is bounde
 from __future__ import annotations
 
 import copy
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 
@@ -21,6 +22,7 @@ from strainbench import sparse as sp
 from strainbench.arrays import FloatArray, IntArray, frozen_array, read_only
 from strainbench.problem import checks
 from strainbench.problem.cached import of_mesh
+from strainbench.problem.contact import Plane
 from strainbench.problem.elements import rest_corners, shape_gradients, sparse_rows
 from strainbench.problem.kinds import Kind, Limits, kind_of
 from strainbench.problem.reach import distances, farthest, longest_edges, pins_apart
@@ -50,6 +52,7 @@ class Problem:
         Symmetric positive definite: the norm itself, in place of the masses.
     linearise_at : (n, 3), optional
         Where methods of one step linearise limits [m]; at the target, if nowhere else.
+    contact : planes that vertices are kept off, optional (`strainbench.problem.contact`)
 
     All arrays are copied and read-only. A vertex in no element is held at its target.
 
@@ -76,6 +79,7 @@ class Problem:
     mass: FloatArray | None = None
     metric: sp.csc_array | None = None
     linearise_at: FloatArray | None = None
+    contact: tuple[Plane, ...] = ()
 
     def __post_init__(self) -> None:
         put = partial(object.__setattr__, self)
@@ -87,7 +91,7 @@ class Problem:
         put("pinned", checks.checked_pins(self.pinned, self.vertices))
         if self.mass is not None:
             put("mass", checks.checked_mass(self.mass, self.vertices))
-        self._put_step(self.metric, self.linearise_at)
+        checks.put_step(self, self.metric, self.linearise_at, self.contact)
         self.kind.check(self.rest.shape[-1], len(self.elements))
         put("_mesh", {})
         _ = self._shape  # finds flat elements
@@ -97,20 +101,13 @@ class Problem:
         target: ArrayLike,
         metric: sp.sparray | None = None,
         linearise_at: ArrayLike | None = None,
+        contact: Sequence[Plane] = (),
     ) -> Problem:
         """The same mesh, limits and pins with other candidates (n, 3) [m], and what is given."""
         other = copy.copy(self)
         object.__setattr__(other, "target", checks.checked_target(target, self.vertices))
-        other._put_step(metric, linearise_at)
+        checks.put_step(other, metric, linearise_at, contact)
         return other
-
-    def _put_step(self, metric: sp.sparray | None, linearise_at: ArrayLike | None) -> None:
-        """Keep what differs between the steps of a scene, checked, where it is given."""
-        if metric is not None:
-            object.__setattr__(self, "metric", checks.checked_metric(metric, self.vertices))
-        if linearise_at is not None:
-            at = checks.checked_target(linearise_at, self.vertices, "linearise_at")
-            object.__setattr__(self, "linearise_at", at)
 
     def tightened(self, margin: float) -> Problem:
         """The same projection with every bound lowered by `margin`, every lower one raised."""
@@ -147,8 +144,8 @@ class Problem:
 
     @property
     def convex(self) -> bool:
-        """Whether the optimum is unique, and certified: no lower bounds, and a norm of masses."""
-        return self.kind.convex and self.metric is None
+        """Whether the optimum is certified: no lower bounds or planes, and a norm of masses."""
+        return self.kind.convex and self.metric is None and not self.contact
 
     @of_mesh
     def _shape(self) -> tuple[FloatArray, FloatArray]:

@@ -31,6 +31,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from strainbench.arrays import FloatArray
+from strainbench.problem.contact import depths, rubs
 from strainbench.problem.dual import dual_gap, relative
 from strainbench.problem.problem import Problem
 from strainbench.referee.kkt import kkt_residual, smallest_gap
@@ -198,6 +199,8 @@ def _certify_local(
     excess = relative(problem, objective - best_known, best_known)
     if worst > violation:
         outcome, reason = "violated", _violated(ref, worst, violation)
+    elif rubs(problem.contact):
+        reason = "contact with friction: no projection, so that no optimum is to be expected"
     elif not residual <= gap:
         reason = f"no local optimum: KKT residual {residual:.2e} above {gap:.0e}"
     else:
@@ -243,8 +246,14 @@ def _unusable(problem: Problem, positions: FloatArray) -> str | None:
 
 
 def _violations(problem: Problem, x: FloatArray) -> FloatArray:
-    """Those of finite positions: infinite where they are too large to be computed."""
+    """Those of finite positions: infinite where they are too large to be computed.
+
+    Depths within planes follow those of the limits, in mean edges.
+    """
     v = problem.violations(x)
+    if problem.contact:
+        deep = depths(problem.contact, x[problem.used]) / problem.edge_length
+        v = np.concatenate([v, deep])
     return np.where(np.isnan(v), np.inf, v)
 
 

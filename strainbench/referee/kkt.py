@@ -6,7 +6,8 @@ derivative, a local optimum of
     minimise 1/2 ||x - target||_M^2  subject to  l_i <= s_i(x) <= b_i
 
 has M (x - target) + sum_i m_i g_i u_i = 0 at the free vertices, with m_i >= 0 where s_i = b_i,
-m_i <= 0 where s_i = l_i, and m_i = 0 elsewhere. The best such multipliers are a non-negative
+m_i <= 0 where s_i = l_i, and m_i = 0 elsewhere; vertices on planes that they are kept off have
+terms -m n, n the plane's normal. The best such multipliers are a non-negative
 least-squares problem; what they leave, in the norm of M^-1, over ||x - target||_M is the residual:
 0 at a local optimum, 1 where the active limits explain nothing of the move from the target. M may
 be a metric: R R^T = M then, and R is M^1/2 else.
@@ -76,10 +77,24 @@ def _active_normals(
     u = (sign[:, None, None] * u).reshape(-1, 3)
     g = sp.csc_array(problem.G[rows.ravel()][:, movable].T)
     together = sp.kron(sp.eye_array(len(rows)), np.ones((rows.shape[1], 1)))
-    normals = root.inverse(sp.csc_array(sp.vstack([g * a for a in u.T]) @ together))
+    outward = sp.vstack([g * a for a in u.T]) @ together
+    outward = sp.hstack([outward, _contact_normals(problem, positions[movable])])
+    normals = root.inverse(sp.csc_array(outward))
     length = sp.linalg.norm(normals, axis=0)
     turns = length > 0
     return sp.csc_array(normals[:, turns] / length[turns])
+
+
+def _contact_normals(problem: Problem, x: FloatArray) -> sp.csc_array:
+    """(3 m, touching) -n at each of the movable vertices x (m, 3) that lies on a plane."""
+    parts = [sp.csc_array((x.size, 0))]
+    for plane in problem.contact:
+        vertex = np.flatnonzero(plane.gaps(x) < NEAR * problem.edge_length)
+        at = sp.csc_array(
+            (np.ones(len(vertex)), (vertex, range(len(vertex)))), (len(x), len(vertex))
+        )
+        parts.append(sp.vstack([-a * at for a in plane.normal]))
+    return sp.csc_array(sp.hstack(parts))
 
 
 def _active(problem: Problem, y: FloatArray) -> tuple[IntArray, FloatArray]:

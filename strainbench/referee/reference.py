@@ -265,4 +265,6 @@ def content_key(problem: Problem) -> str:
     if problem.metric is not None:
         for array in (problem.metric.data, problem.metric.indices):
             digest.update(array.tobytes())
+    for plane in problem.contact:
+        digest.update(np.concatenate([plane.point, plane.normal]).tobytes())
     return digest.hexdigest()[:32]

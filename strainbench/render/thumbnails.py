@@ -41,6 +41,7 @@ SHOTS = {
     "chainmail": Shot(("resolution=14",), 18),
     "collision": Shot(("resolution=20",), 28),
     "drape": Shot(("resolution=20",), 1, Camera(20.0, 10.0)),
+    "finger": Shot(("press=side", "depth=0.001"), 10, Camera(20.0, 10.0), "lcp-pgs"),
     "flag": Shot(("resolution=14",), 60),
     "garment": Shot(("resolution=8",), 15),
     "spike": Shot(("resolution=20",), 75),

@@ -9,6 +9,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,8 @@ def read_mesh(path: str | Path, texture: bool = True) -> MeshFile:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _read_other(file: Path) -> Polygons:
+def meshio_mesh(file: Path) -> Any:
+    """What meshio makes of a file; ValueError with its reason in a line."""
     if not any(file.name.lower().endswith(end) for end in meshio.extension_to_filetypes):
         valid = ", ".join(sorted({".obj", *meshio.extension_to_filetypes}))
         raise ValueError(
@@ -77,11 +79,15 @@ def _read_other(file: Path) -> Polygons:
     said = StringIO()  # meshio prints reasons, and exits
     try:
         with np.errstate(over="ignore"), redirect_stdout(said), redirect_stderr(said):
-            mesh = meshio.read(file)
+            return meshio.read(file)
     except (Exception, SystemExit) as error:  # meshio raises all kinds
         words = said.getvalue() if isinstance(error, SystemExit) else str(error)
         reason = shortened(words.split()) or type(error).__name__
         raise ValueError(f"not a readable mesh ({reason})") from None
+
+
+def _read_other(file: Path) -> Polygons:
+    mesh = meshio_mesh(file)
     surface = ("triangle", "quad", "polygon")
     for block in mesh.cells:
         if block.type not in (*surface, "line", "vertex"):

@@ -93,14 +93,26 @@ class VolumeScenario(Scenario):
 
     def play(self, project: Callable[[FloatArray], FloatArray]) -> Iterator[StepReport]:
         """Time steps from rest; see the base class."""
-        body, h, time = self._body, self.step, 0.0
-        x, v = body.rest.copy(), np.zeros_like(body.rest)
+        body = self._body
+        at_rest = body.rest[body.pinned]
+        return self._steps(project, np.zeros_like(body.rest), lambda time: at_rest)  # noqa: ARG005
+
+    def _steps(
+        self,
+        project: Callable[[FloatArray], FloatArray],
+        v: FloatArray,
+        pins: Callable[[float], FloatArray],
+    ) -> Iterator[StepReport]:
+        """Time steps from velocities v (n, 3), with pins (p, 3) where they are at a time."""
+        body, h, time, x = self._body, self.step, 0.0, self._body.rest.copy()
         while True:
             begin, iterations, converged = perf_counter(), 1, True
             if self.integrator == "linearised":
-                candidate = linearised_step(body, x, v, h)
+                candidate = linearised_step(body, x, v, h, pins(time + h))
             else:
-                candidate, newton = minimise_step(body, x, x + h * v, h, NewtonSettings())
+                start = x.copy()
+                start[body.pinned] = pins(time + h)
+                candidate, newton = minimise_step(body, start, x + h * v, h, NewtonSettings())
                 iterations, converged = newton.iterations, newton.converged
             seconds = perf_counter() - begin
             limited = project(candidate)

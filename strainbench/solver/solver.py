@@ -12,6 +12,7 @@ import numpy as np
 
 from strainbench.arrays import FloatArray
 from strainbench.fields import same, spelled
+from strainbench.problem.contact import rubs
 from strainbench.problem.grid import square_grid
 from strainbench.problem.problem import Problem
 
@@ -106,8 +107,9 @@ class Solver(ABC):
     then keeps in its `state` (`strainbench.solver.memory`): `--start warm` sets it.
     `takes_exact` says that the method has a form for exact limits, `takes_lower` that it has one
     for lower bounds, which are not convex, `takes_principal` for limits on principal stretches,
-    `takes_metric` that it projects in any norm; other kinds of limits name the declaration that
-    they need (`strainbench.problem.kinds`).
+    `takes_metric` that it projects in any norm, `takes_contact` that it keeps vertices off planes,
+    `takes_friction` that these rub; other kinds of limits name the declaration that they need
+    (`strainbench.problem.kinds`).
     """
 
     name: ClassVar[str]
@@ -116,6 +118,8 @@ class Solver(ABC):
     takes_lower: ClassVar[bool] = False
     takes_principal: ClassVar[bool] = False
     takes_metric: ClassVar[bool] = False
+    takes_contact: ClassVar[bool] = False
+    takes_friction: ClassVar[bool] = False
 
     def supports(self, problem: Problem) -> str | None:
         """None, or the reason why this method cannot take the problem."""
@@ -124,6 +128,10 @@ class Solver(ABC):
                 return reason
         if problem.metric is not None and not self.takes_metric:
             return "it projects in norms of masses alone, not in that of a metric"
+        if problem.contact and not self.takes_contact:
+            return "it has no rows for contact with planes"
+        if rubs(problem.contact) and not self.takes_friction:
+            return "it has no friction, with which a step is no projection"
         return None
 
     def missing(self) -> str | None:

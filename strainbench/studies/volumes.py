@@ -4,8 +4,9 @@
 
 plays the scene `beam-compress` without limits until each kind of them is violated first (Fig. 4),
 and the scene `beam` with the methods that take one linearised step, which tells how far beyond the
-limits the linearisation leaves it. Written are `volumes.md`, `fig4.csv` and `violation.csv`. There
-are no times in it.
+limits the linearisation leaves it and what a step costs (`sweeps.py`); and it presses the scene
+`finger` (Fig. 3, `press.py`). Written are `volumes.md`, `fig4.csv`, `violation.csv`, `sweeps.csv`
+and `press.csv`. There are no times in it but as ratios.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from itertools import islice, product
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -31,6 +32,9 @@ from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.stage import Stage, StageError
 from strainbench.scenario.volume import VolumeScenario
 from strainbench.solver.registry import find_solver
+from strainbench.studies import press, sweeps
+from strainbench.studies.press import Press
+from strainbench.studies.sweeps import Sweeps
 
 KINDS = ("orthogonal", "isotropic", "hyperbolic", "ellipsoid", "linear")
 METHODS = ("lcp-pgs-literal", "lcp-pgs", "lcp-pgs-biot", "lcp-qp-literal", "lcp-qp")
@@ -148,9 +152,14 @@ def _steps(scene: str, step: float) -> int:
 
 
 def documented(
-    firsts: Sequence[First], beams: Sequence[Held], about: str, command: str
+    firsts: Sequence[First],
+    beams: Sequence[Held],
+    costs: Sequence[Sweeps],
+    fingers: Sequence[Press],
+    about: str,
+    command: str,
 ) -> Document:
-    """Both tables."""
+    """All tables."""
     fig_4 = Table(
         "When limits are violated first (Fig. 4)",
         ["limits", STEP, *(_number(*c) for c in FIG_4_COLUMNS)],
@@ -165,14 +174,20 @@ def documented(
         about=VIOLATION,
     )
     return Document(
-        "Limits on principal stretches of volumes", [Code(command), about, fig_4, violation]
+        "Limits on principal stretches of volumes",
+        [Code(command), about, fig_4, violation, sweeps.table(costs), press.table(fingers)],
     )
 
 
-def measured(steps: Sequence[float], resolution: int) -> tuple[list[First], list[Held]]:
+Row = TypeVar("Row", First, Held, Sweeps, Press)
+
+
+def measured(
+    steps: Sequence[float], resolution: int
+) -> tuple[list[First], list[Held], list[Sweeps], list[Press]]:
     """All rows, said as they are found."""
 
-    def said(rows: Iterator[First | Held]) -> Iterator[First | Held]:
+    def said(rows: Iterator[Row]) -> Iterator[Row]:
         for row in rows:
             typer.echo(", ".join(f"{k} {v}" for k, v in asdict(row).items()))
             yield row
@@ -180,23 +195,30 @@ def measured(steps: Sequence[float], resolution: int) -> tuple[list[First], list
     firsts = (first_violated(k, h, resolution) for k, h in product(KINDS, steps))
     cells = product(MATERIALS, METHODS, steps)
     beams = (held(m, s, h, resolution) for m, s, h in cells if _takes(s, m))
-    return list(said(firsts)), list(said(beams))  # type: ignore[arg-type]
+    costs = list(said(sweeps.swept()))
+    return list(said(firsts)), list(said(beams)), costs, list(said(press.presses()))
 
 
 def write(folder: Path, steps: Sequence[float], resolution: int) -> None:
     """Measure, and write tables and rows to a folder."""
     open_folder(folder, "-o")
     with locked(folder):
-        firsts, beams = measured(steps, resolution)
+        firsts, beams, costs, fingers = measured(steps, resolution)
         name, facts = describe_machine(1)
         remember_machine(folder, name, facts)
         spelled = ",".join(f"{1e3 * h:g}" for h in steps)
         command = (
             f"python -m strainbench.studies.volumes --step {spelled} --resolution {resolution}"
         )
-        document = documented(firsts, beams, f"Measured on {name}.", command)
+        document = documented(firsts, beams, costs, fingers, f"Measured on {name}.", command)
         write_whole(folder / "volumes.md", markdown(document).encode())
-        for file, rows in (("fig4.csv", firsts), ("violation.csv", beams)):
+        parts = (
+            ("fig4.csv", firsts),
+            ("violation.csv", beams),
+            ("sweeps.csv", costs),
+            ("press.csv", fingers),
+        )
+        for file, rows in parts:
             table = Table.of(pd.DataFrame([asdict(row) for row in rows]))
             write_whole(folder / file, csv(table).encode())
 

@@ -9,9 +9,13 @@ import pytest
 
 from scenarios.beam import Beam
 from scenarios.beam_compress import BeamCompress
+from scenarios.finger import Finger
+from solvers.lcp_pgs import LcpPgs
+from solvers.lcp_qp import LcpQp
 from strainbench.bench.journal import FRAMES
 from strainbench.bench.judge import _certificates
 from strainbench.bench.plan import plan_one
+from strainbench.render.export import surface
 from strainbench.scenario.stage import Stage, StageError
 from strainbench.solver.registry import find_solver
 
@@ -112,6 +116,74 @@ def test_the_minimising_integrator_plays_the_same_beam():
     assert heights[0] == pytest.approx(heights[1], abs=2e-4)
 
 
+def pressed(steps, solver=None, **settings):
+    """The finger after so many steps of .1 mm: the force on the table [N], and its last answer."""
+    stage, solutions = Stage.opened(Finger(**settings), solver or LcpPgs()), []
+
+    def project(target):
+        found = stage.solve(target)
+        solutions.append(found.solution)
+        return stage.accept(found)
+
+    list(stage.steps(steps, project))
+    return solutions[-1].details["push"] / stage.scenario.step**2, solutions[-1], stage
+
+
+def test_the_finger_has_its_tetrahedra():
+    body = Finger().solid()
+    assert (len(body.rest), len(body.elements), len(body.pinned)) == (141, 348, 22)
+    np.testing.assert_allclose(np.ptp(body.rest, axis=0), [0.07, 0.016 * np.sin(np.pi / 3), 0.016])
+    assert 1e6 * body.elastic.volumes.sum() == pytest.approx(11.09, abs=0.005)
+    finer = Finger(resolution=2).solid()
+    assert len(finer.elements) == 8 * 348
+    assert finer.elastic.volumes.sum() == pytest.approx(body.elastic.volumes.sum())
+    assert surface(Finger().problem())[0].shape == (2 * 19 * 6 + 2 * 6, 3)
+    np.testing.assert_allclose(body.rest[body.pinned, 0].max(), 0.0526, atol=5e-5)
+
+
+FORCES = {  # [N] of a prototype, within 5%, but for the side, whose diagonals are others
+    ("flat", 5): (2.32, 2.32, 0.05),
+    ("flat", 10): (4.67, 4.67, 0.05),
+    ("side", 5): (2.41, 2.08, 0.06),
+    ("side", 10): (8.97, 4.04, 0.065),
+    ("tip", 5): (4.00, 4.00, 0.05),
+}
+
+
+@pytest.mark.parametrize(("press", "steps"), FORCES)
+def test_a_finger_is_as_soft_when_flat_and_far_stiffer_else(press, steps):
+    *known, near = FORCES[press, steps]
+    found = []
+    for material in ("anisotropic", "isotropic"):
+        force, last, stage = pressed(steps, press=press, material=material)
+        assert last.status == "linearised step solved" or last.details["rows"] == 0
+        assert last.details["cone_error"] < 1e-14
+        depth = -stage.frame.contact[0].gaps(stage.positions).min()
+        assert depth < 1e-5 * stage.problem.edge_length
+        found.append(force)
+    assert found == [pytest.approx(k, rel=near) for k in known]
+
+
+def test_friction_stiffens_the_press_on_the_side():
+    forces = [pressed(10, press="side", friction=mu)[0] for mu in (0.0, 0.25, 0.5)]
+    assert forces == [pytest.approx(k, rel=0.065) for k in (4.2, 5.3, 9.0)]
+
+
+def test_the_finger_stops_at_its_depth():
+    stage = Stage.opened(Finger(depth=2.5e-4), LcpPgs())
+    list(stage.steps(5))
+    body = stage.scenario.solid()
+    moved = stage.positions[body.pinned] - body.rest[body.pinned]
+    np.testing.assert_allclose(moved, np.tile([0, -2.5e-4, 0], (22, 1)), atol=1e-15)
+    assert Finger(depth=4e-3).usual_steps == 40
+
+
+def test_a_plane_with_friction_keeps_lcp_qp_away():
+    with pytest.raises(StageError, match="it has no friction"):
+        Stage.opened(Finger(), LcpQp())
+    Stage.opened(Finger(friction=0.0), LcpQp())
+
+
 def test_cloth_solvers_are_told_why_they_cannot():
     with pytest.raises(StageError, match="no form for limits on principal stretches"):
         Stage.opened(Beam(), find_solver("clarabel"))
@@ -125,6 +197,11 @@ def test_cloth_solvers_are_told_why_they_cannot():
         (Beam, {"integrator": "sap"}, "integrator is 'sap': valid are linearised, nonlinear"),
         (Beam, {"step": 0.0}, r"step is 0\.0"),
         (Beam, {"integrator": "nonlinear", "alpha": 1.0}, r"alpha is 1\.0: 0 is valid"),
+        (Finger, {"press": "nail"}, "press is 'nail': valid are flat, side, tip"),
+        (Finger, {"material": "wood"}, "material is 'wood': valid are anisotropic, isotropic"),
+        (Finger, {"friction": -1.0}, r"contact\.friction is -1\.0"),
+        (Finger, {"depth": 0.0}, r"depth is 0\.0: a length above 0"),
+        (Finger, {"resolution": 3}, "resolution is 3: a power of two is valid"),
         (BeamCompress, {"young": -1.0}, r"young is -1\.0"),
         (BeamCompress, {"limit": 1.0}, r"limit is 1\.0"),
     ],

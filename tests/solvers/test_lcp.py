@@ -10,7 +10,7 @@ import pytest
 
 from scenarios.beam import Beam
 from solvers.lcp_pgs import LcpPgs
-from solvers.lcp_pgs.step import Linearised
+from solvers.lcp_pgs.step import Forces, Linearised
 from solvers.lcp_qp import LcpQp
 from strainbench import PrincipalLimits, Problem, StretchLimits, certify, solve
 from strainbench.problem.grid import square_grid
@@ -52,7 +52,7 @@ def test_the_answer_is_within_the_linearised_limits_and_stationary(frame):
     solver = LcpPgs(rounds=1, **EXACT)
     step = Linearised(frame, "exact")
     chosen = solver._flagged(step)
-    rows = solver._rows(step, chosen, np.zeros(len(chosen)))
+    rows = solver._rows(step, chosen, Forces.none(step))
     d = (solve(frame, solver).positions - step.start)[frame.free].ravel()
     room = rows.J @ d + rows.c
     assert room.min() > -1e-8
