@@ -70,7 +70,7 @@ def run_cells(
 
     _check_words(scheduler, steps, duration, debug)
     solvers, tolerances, starts = solver or ["all"], _numbers(tolerance), start.split(",")
-    mode = with_frames(mode, frames) if frames else mode
+    mode = mode if frames is None else with_frames(mode, frames)
     how = (mode, steps, tolerances, time_limit, duration, starts, threads, repeats)
     cells = plan(scenarios, solvers, set_ or [], *how)
     if "cold" not in starts and (cold := never_warm(solvers)):

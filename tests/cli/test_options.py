@@ -37,6 +37,8 @@ VERBS = {
     "profile": ["swing", *SOLVER, *SMALL, "--frame", "1"],
     "check": ["none"],
     "testset": ["d", "--small"],
+    "explain": ["1"],
+    "claims": [],
 }
 """A valid line of each verb, to which one wrong word is added."""
 WHOLE = ["", "x", "-1", "0", "1.5", "nan", "inf", "99999999999999999999"]
@@ -87,6 +89,7 @@ NONSENSE = {
     "--solver": NAME,
     "--set": SETTING,
     "--mode": ["", "x", "0", "Replay", "simulate,replay"],
+    "--frames": ["", "x", "0", "3-2", "1-2-3", "2"],
     "--processes": ["", "x", "Fork", "fork,spawn"],
     "--to": ["", "x", "0.1", "0mm", "-1mm", "nanmm", "1 mile", "20ms"],
     "--within": ["", "x", "20", "0ms", "-1ms", "infs", "1mm"],
