@@ -16,11 +16,11 @@ from strainbench.document import Items, Part, Picture, Prose, Table
 from strainbench.document.html import html
 from strainbench.progress import Track
 from strainbench.report import warm
-from strainbench.report.charts import scores
+from strainbench.report.charts import Makers, scores
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.machine import machine_section
-from strainbench.report.page.drawn import Drawn, Speed, drawings_of
+from strainbench.report.page.drawn import Drawn, drawings_of
 from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import LOCAL, OLDER, details, ledger_table, older, reasons
 
@@ -86,12 +86,12 @@ def sections(
     steps: pd.DataFrame,
     failed: pd.DataFrame,
     machines: Machines,
-    speed: Speed,
+    make: Makers,
     mapped: bool,
     track: Track,
 ) -> list[Section]:
     """Those that have something to show."""
-    drawings = drawings_of(folder, runs, steps, speed, track)
+    drawings = drawings_of(folder, runs, make, track)
     hard = [name for name, there in (("matrix", len(failed)), ("maps", mapped)) if there]
     boxes: dict[str, Sequence[str]] = {"table": ("table1", "cells"), "failures": hard}
     swept = _folded("Sweeps in numbers", sweep_tables(runs), Prose(BEYOND))
