@@ -174,9 +174,14 @@ def with_unit(text):
 
 def in_charts(page, expected):
     """The same of what is drawn, and of what hovering shows."""
-    script = """(async () => (await specsOf('page-distance')))()"""
-    for name, spec in page.run(script).items():
-        points = [p for layer in spec["layer"] for p in layer["data"]["values"] if "quartiles" in p]
+    script = """(async () => (await specsOf('distance')))()"""
+    for name, specs in page.run(script).items():
+        points = [
+            p
+            for layer in specs["page"]["layer"]
+            for p in layer["data"]["values"]
+            if "quartiles" in p
+        ]
         assert points
         for point in points:
             right, where = expected[point["cell"]], (name, point["cell"])

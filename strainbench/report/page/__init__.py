@@ -119,11 +119,11 @@ def _payload(
 
 
 def _specs(charts: Iterable[Drawn]) -> dict[str, str]:
-    """Packed, those apart that a page needs at different times: by target and accuracy."""
+    """Packed by accuracy, which a page needs at different times; a chart's targets side by side,
+    as they share most of their data and gzip sees no further than 32 kB."""
     packs: dict[str, dict[str, object]] = {}
     for chart in charts:
-        for target, spec in chart.specs.items():
-            packs.setdefault(f"{target}-{chart.about.get('against', '')}", {})[chart.name] = spec
+        packs.setdefault(chart.about.get("against", ""), {})[chart.name] = chart.specs
     return {name: data.packed(specs, data.DRAWN) for name, specs in packs.items()}
 
 
