@@ -11,7 +11,6 @@ from typing import Any
 
 from strainbench.bench.mode import window
 from strainbench.fields import plain, restored
-from strainbench.referee.reference import REFERENCE_SOLVER
 from strainbench.scenario.registry import find_scenario, scenarios_of
 from strainbench.scenario.scenario import Scenario
 from strainbench.solver.registry import find_solver, solvers_of
@@ -155,6 +154,8 @@ class Cell:
         FileNotFoundError
             If a source is not there.
         """
+        from strainbench.referee.reference import REFERENCE_SOLVER
+
         recorder = plugin_source(type(find_solver(REFERENCE_SOLVER)))
         sources = [f for s in (self.scenario.source, recorder) for f in plugin_files(s)]
         return _digest([self.scenario.identity, self.window[1], digest(closure(*sources))])

@@ -11,13 +11,15 @@ import re
 from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from itertools import accumulate, pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from strainbench.bench.cell import Cell
 from strainbench.bench.ending import Ending
-from strainbench.bench.journal import Events, only
-from strainbench.referee.certificate import Certificate
-from strainbench.referee.conduct import Conduct
+
+if TYPE_CHECKING:  # reports read the kinds and need no referee
+    from strainbench.bench.cell import Cell
+    from strainbench.bench.journal import Events
+    from strainbench.referee.certificate import Certificate
+    from strainbench.referee.conduct import Conduct
 
 RISE = 0.01  # of the largest energy in motion and strain so far: by so much energy may not rise
 SHIFT = 1e-4  # [edges] by which a free cloth's centre of mass may be moved
@@ -144,7 +146,7 @@ def rises(events: Events) -> dict[int, float]:
     It is relative to the largest energy of motion, strain and contact so far. Steps without
     energies, and those of scenes at rest, have none.
     """
-    steps = only(events, "step")
+    steps = [event for event in events if event["event"] == "step"]
     stored = [sum(e[name] for name in STORED) for e in steps]
     totals = [s + e["gravity_energy"] for s, e in zip(stored, steps, strict=True)]
     scales = list(accumulate(stored, max))[1:]

@@ -10,13 +10,34 @@ from jinja2 import Environment, PackageLoader, Template
 from markdown_it import MarkdownIt
 from markupsafe import Markup, escape
 
-from strainbench.document import Code, Faint, Part, Picture, Prose, Strong, blocks
+from strainbench.document import Code, Document, Faint, Part, Picture, Prose, Strong, blocks
 from strainbench.escape import plain
+
+STYLE = """
+body { max-width: 62em; margin: 0 auto; padding: 20px 24px 60px; color: #202124;
+  font: 15px/1.5 "Helvetica Neue", Helvetica, Arial, "Liberation Sans", sans-serif;
+  overflow-wrap: break-word; }
+h1, h2 { font-weight: 400; } h3 { font-size: 15px; margin: 30px 0 4px; }
+.scroll { overflow-x: auto; } th, td { padding: 3px 10px; text-align: left; }
+.right { text-align: right; }
+code { font-size: 13px; overflow-wrap: anywhere; }
+"""
 
 
 def html(part: Part, level: int = 1) -> Markup:
     """The part, its titles from this level on; nothing is fetched."""
     return Markup(_template().render(blocks=list(blocks(part, level))))
+
+
+def page(document: Document) -> str:
+    """A file of its own, which needs nothing beside it."""
+    form = Markup(
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<link rel="icon" href="data:,">\n<title>{}</title>\n<style>{}</style>\n</head>\n'
+        "<body>\n{}</body>\n</html>\n"
+    )
+    return str(form.format(document.title, Markup(STYLE), html(document)))
 
 
 def inline(text: str) -> Markup:

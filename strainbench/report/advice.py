@@ -12,7 +12,7 @@ from strainbench.bench.mode import replays
 from strainbench.bench.settings import Choices
 from strainbench.document import Column, Document, Items, Part, Prose, Strong, Table
 from strainbench.report.candidate import Candidate, Records
-from strainbench.report.measures import digits
+from strainbench.report.measures import factor_text
 from strainbench.report.missing import Missing, labelled, missing_cells
 from strainbench.report.question import Question
 
@@ -84,7 +84,7 @@ class Advice:
 
     def _line(self, c: Candidate) -> list[str]:
         text = self.question.budget.text
-        factors = [digits(factor) if factor > 1 else "" for factor in c.factors]
+        factors = [factor_text(factor) if factor > 1 else "" for factor in c.factors]
         quartiles = f"{text(c.time.low)}-{text(c.time.high)}"
         name = Strong(c.name) if c.meets else c.name
         return [c.sign, name, text(c.time.median), quartiles, c.accuracy, *factors]

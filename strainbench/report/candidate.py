@@ -18,7 +18,7 @@ from strainbench.report.measures import (
     SIGNS,
     VIOLATED,
     Quartiles,
-    digits,
+    factor_text,
     finish,
     numbers,
     projections,
@@ -88,7 +88,7 @@ class Candidate:
         """By which factors it fails, in words."""
         nouns = ("time", self.question.accuracy.noun)
         return " and ".join(
-            f"{digits(factor, 2 if factor >= 1.1 else 3)}× the {noun}"
+            f"{factor_text(factor, 2 if factor >= 1.1 else 3)}× the {noun}"
             for factor, noun in zip(self.factors, nouns, strict=True)
             if factor > 1
         )

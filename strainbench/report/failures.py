@@ -15,6 +15,7 @@ from typing import Any
 import pandas as pd
 
 from strainbench.bench.ending import Ending
+from strainbench.bench.failure import FAILURES
 from strainbench.document import Document, Items, Prose, Table
 from strainbench.referee.certificate import OUTCOMES
 from strainbench.report.machine import machine_section
@@ -37,7 +38,7 @@ within the limits, the failure is the method's. †: it does not, by its nature 
 ours."""
 RUN = ("scenario", "mode", "steps_asked", "tolerance")
 PASSED, PARTLY, FAILED = "✓", "○", "✗"
-COLUMNS = ("case", "method", "sign", "found", "neighbour", "verdict", "reason")
+COLUMNS = ("case", "method", "sign", "found", "neighbour", "verdict", "reason", "failure", "since")
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,8 @@ def failures(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
             easier = None if place is None else runs.loc[place]
             verdict = "" if sign == PASSED else _verdict(row, easier, case.apart)
             there = "" if easier is None else easier["outcome"]
-            lines[index] = (title, row["solver"], sign, found, there, verdict, row["reason"])
+            told = (sign, found, there, verdict, row["reason"], *row[[*FAILURES]])
+            lines[index] = (title, row["solver"], *told)
     return pd.DataFrame.from_dict(lines, orient="index", columns=list(COLUMNS))
 
 
@@ -175,7 +177,9 @@ def failures_document(
 
 
 def _failure(row: Row) -> str:
-    return f"{row['method']}: {row['found']}; {row['verdict']}. In full: {row['reason']}"
+    since = "" if pd.isna(row["since"]) else f", first in step {row['since']:.0f}"
+    kind = f"; {row['failure']}{since}" if row["failure"] else ""
+    return f"{row['method']}: {row['found']}{kind}; {row['verdict']}. In full: {row['reason']}"
 
 
 def _cell(row: Row) -> str:

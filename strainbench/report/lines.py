@@ -8,6 +8,7 @@ from math import isfinite
 import numpy as np
 import pandas as pd
 
+from strainbench.bench.failure import Failure
 from strainbench.document import Between, Column, Faint, Strong
 from strainbench.report.measures import (
     COUNT,
@@ -29,8 +30,17 @@ MEASURES: tuple[str | Column, ...] = (
     Column("mean", "ms", right=True),
     *(Column(name, right=True) for name in ("violation", "gap")),
     Column("distance", "mm", right=True),
+    Column("iterations", right=True),
 )
 """What is said of each cell."""
+MANY = 1000  # iterations, of which fractions say nothing
+TELLING = frozenset(
+    {
+        *(Failure.FALSE_CLAIM, Failure.ITERATION_LIMIT, Failure.INVERTED),
+        *(Failure.ENERGY, Failure.MOMENTUM, Failure.DRIFTS),
+    }
+)
+"""Kinds of failure that say more than how a cell ended."""
 
 
 def ranked(cells: pd.DataFrame) -> pd.DataFrame:
@@ -51,7 +61,12 @@ def marked(cells: pd.DataFrame) -> Iterator[tuple[Row, list[str]]]:
 
 def measures_of(row: Row) -> list[str]:
     """The entries of MEASURES; numbers that do not count are faint."""
-    texts = [*time_of(row), milliseconds(row["solve_seconds_mean"]), *accuracy_of(row)]
+    texts = [
+        *time_of(row),
+        milliseconds(row["solve_seconds_mean"]),
+        *accuracy_of(row),
+        iterations_of(row),
+    ]
     return [ending_text(row), *(texts if row["ending"] in COUNT else map(Faint, texts))]
 
 
@@ -69,6 +84,12 @@ def accuracy_of(row: Row) -> tuple[str, str, str]:
     return power(violation), power(gap) if isfinite(gap) else "local", distance_of(row)
 
 
+def iterations_of(row: Row) -> str:
+    """Their mean over all steps."""
+    mean = row["iterations_mean"]
+    return (f"{mean:.0f}" if mean >= MANY else f"{mean:.4g}") if isfinite(mean) else ""
+
+
 def milliseconds(seconds: float) -> str:
     """Two significant digits, in ms."""
     return seconds_text(1000 * seconds)
@@ -78,4 +99,5 @@ def ending_text(row: Row) -> str:
     """How a cell ended, its sign before the words."""
     ending = row["ending"]
     words = {FEASIBLE: "within the limits", OUT_OF_TIME: f"out of time, {row['why']}"}
-    return f"{SIGNS[ending]} {words.get(ending, row['why'] or ending)}"
+    more = f"; {row['failure']}" if row["failure"] in TELLING else ""
+    return f"{SIGNS[ending]} {words.get(ending, row['why'] or ending)}{more}"

@@ -17,7 +17,7 @@ from strainbench.bench.columns import STEP_COLUMNS, WORDS
 from strainbench.bench.ending import Ending
 from strainbench.bench.failure import by_clock
 from strainbench.report.numbers import power
-from strainbench.report.rows import Row
+from strainbench.report.rows import Row, rows_of
 
 OPTIMAL, FEASIBLE, VIOLATED = "optimal", "feasible", "violated"
 OUT_OF_TIME, NO_ANSWER = "out of time", "no answer"
@@ -33,6 +33,7 @@ ASKED = (
     *("solve_seconds_median", "solve_seconds_mean"),
 )
 """Columns of steps, and of runs, that measures are taken of."""
+MANY_TIMES = 1e5
 NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
 
@@ -145,7 +146,7 @@ def measured(runs: pd.DataFrame, steps: pd.DataFrame) -> pd.DataFrame:
     """
     parsed = numbers(steps[[name for name in READ if name in steps]])
     own, none = dict(iter(parsed.groupby("cell"))), parsed.iloc[:0]
-    asked = runs[[*ASKED]].to_dict("records")
+    asked = rows_of(runs[[*ASKED]])
     rows = [_measures(run, own.get(run["cell"], none)) for run in asked]
     return runs.assign(**pd.DataFrame(rows, columns=list(NEW), index=runs.index))
 
@@ -165,6 +166,13 @@ def digits(value: float, count: int = 2) -> str:
         return f"{value:g}"
     places = count - 1 - floor(log10(abs(float(f"{value:.{count - 1}e}"))))
     return f"{round(value, places):.{max(places, 0)}f}"
+
+
+def factor_text(factor: float, count: int = 2) -> str:
+    """Of how many times: significant digits, with a power of ten where there are very many."""
+    if factor < MANY_TIMES or not isfinite(factor):
+        return digits(factor, count)
+    return f"{factor:.{count - 1}e}".replace("e+0", "e").replace("e+", "e")
 
 
 def with_unit(value: float, units: Sequence[tuple[float, str]], count: int = 2) -> str:

@@ -15,7 +15,7 @@ from strainbench.report.lines import accuracy_of, milliseconds, ranked, time_of
 from strainbench.report.measures import COUNT, FEASIBLE, OPTIMAL, OUT_OF_TIME, VIOLATED
 from strainbench.report.names import HOW, cells
 from strainbench.report.numbers import power
-from strainbench.report.rows import Row
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.table import UNCONSTRAINED, Group, groups
 
 
@@ -168,7 +168,7 @@ class Sheet:
             ]
         lines: list[list[str]] = []
         here = self.runs[self.runs["mesh"].isin(meshes)]
-        on_mesh = {mesh: ranked(here[here["mesh"] == mesh]).to_dict("records") for mesh in meshes}
+        on_mesh = {mesh: rows_of(ranked(here[here["mesh"] == mesh])) for mesh in meshes}
         for kind, methods in _kinds(here, meshes).items():
             if methods and KINDS[kind]:
                 lines.append([Span.of(KINDS[kind], len(header))])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache, partial
 from pathlib import Path
 
 import pandas as pd
@@ -12,13 +11,13 @@ from strainbench.bench.records import read_machines
 from strainbench.document import Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.progress import Track, untracked
-from strainbench.report.charts import Target, chart_sheets, work_precision
+from strainbench.report.charts import Makers, chart_sheets
 from strainbench.report.drawing import drawn_beside
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
 from strainbench.report.local import local_table
 from strainbench.report.page import report_page
-from strainbench.report.page.drawn import Speed
+from strainbench.report.page.races import with_cases
 from strainbench.report.paper import as_latex, chosen_methods
 from strainbench.report.runs import load_runs
 from strainbench.report.steps import newest_steps
@@ -29,18 +28,18 @@ from strainbench.report.table import as_markdown, tidy
 def write_report(folder: Path, track: Track = untracked) -> list[Path]:
     """Write table1.csv, .md, .tex, what else there is to tell, the charts and index.html."""
     runs = load_runs(folder)
-    speed = cache(partial(work_precision, runs))
-    sheets = chart_sheets(folder, runs, newest_steps(folder, runs), speed(Target.PAGE, "distance"))
+    make = Makers.of(folder, with_cases(runs), newest_steps(folder, runs))
+    sheets = chart_sheets(folder, make)
     charts = [Path(path) for sheet in sheets for path in sheet.paths]
     with drawn_beside(sheets):
-        texts = _texts(folder, runs, speed, [path.name for path in charts], track)
+        texts = _texts(folder, runs, make, [path.name for path in charts], track)
         for name, text in texts.items():
             (folder / name).write_text(text, encoding="utf-8")
     return [*(folder / name for name in texts), *charts]
 
 
 def _texts(
-    folder: Path, runs: pd.DataFrame, speed: Speed, charts: Sequence[str], track: Track
+    folder: Path, runs: pd.DataFrame, make: Makers, charts: Sequence[str], track: Track
 ) -> dict[str, str]:
     """All but the charts' files, by name."""
     machines = read_machines(folder)
@@ -60,5 +59,5 @@ def _texts(
     if (local := local_table(folder, runs)).lines:
         texts["local.md"] = markdown(local)
     files = [*texts, *charts]
-    texts["index.html"] = report_page(folder, runs, failed, machines, files, speed, track)
+    texts["index.html"] = report_page(folder, runs, failed, machines, files, make, track)
     return texts

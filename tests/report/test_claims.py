@@ -46,6 +46,10 @@ def test_the_document_has_each_claim_with_its_command(tmp_path):
         assert f"### {claim.name} (" in text
         assert all(command in text for command in claim.commands)
     assert files[1].read_text(encoding="utf-8").count("\n") == len(CLAIMS) + 1
+    page = files[2].read_text(encoding="utf-8")
+    assert page.startswith("<!doctype html>")
+    assert page.count("<h3>") == len(CLAIMS)
+    assert "src=" not in page
 
 
 def test_verdicts_are_counted():

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
-from strainbench.bench.records import RUNS, STEPS, append_rows
+from strainbench.bench.records import RUNS, STEPS, append_rows, latest_runs, latest_steps
 from strainbench.report import write_report
 from tests.browser import Browser, chromium
 from tests.imports import HERE
@@ -174,9 +174,14 @@ def with_unit(text):
 
 def in_charts(page, expected):
     """The same of what is drawn, and of what hovering shows."""
-    script = """(async () => (await specsOf('page-distance')))()"""
-    for name, spec in page.run(script).items():
-        points = [p for layer in spec["layer"] for p in layer["data"]["values"] if "quartiles" in p]
+    script = """(async () => (await specsOf('distance')))()"""
+    for name, specs in page.run(script).items():
+        points = [
+            p
+            for layer in specs["page"]["layer"]
+            for p in layer["data"]["values"]
+            if "quartiles" in p
+        ]
         assert points
         for point in points:
             right, where = expected[point["cell"]], (name, point["cell"])
@@ -214,6 +219,81 @@ def in_scores(page, field):
     ):
         solved = [s for s in had if solver[s["cell"]] == method and s["outcome"] == "optimal"]
         yield ("score", method), float(share), 100 * len(solved) / number, 0.1
+
+
+@pytest.fixture(scope="module")
+def failing(browser, tmp_path_factory):
+    """The report of committed results: hard cases, energies, sweeps."""
+    folder = tmp_path_factory.mktemp("failing") / "failing"
+    folder.mkdir()
+    for source in (HERE / "results" / name for name in ("failures", "sweeps", "swing-short")):
+        append_rows(folder / RUNS, RUN_COLUMNS, latest_runs(source).values())
+        append_rows(folder / STEPS, STEP_COLUMNS, latest_steps(source))
+    write_report(folder)
+    shown = browser.open(folder / "index.html", hash_="#scene=*")
+    shown.until("document.body.dataset.drawn !== undefined")
+    yield folder, shown
+    shown.close()
+
+
+def in_matrix(page, runs):
+    """(where, what is shown, what it should be, to what share of it) of the hard cases."""
+    for line in page.run("data.failures"):
+        found = re.search(r"(gap|violated by) ([\d.e-]+)", line["found"])
+        if found:
+            name = "relative_gap_max" if found[1] == "gap" else "max_violation"
+            right = float(runs[line["cell"]][name])
+            yield (line["case"], line["method"]), float(found[2]), right, POWER
+
+
+def in_sweeps(page, runs):
+    """The same of the points of the sweeps' charts."""
+    specs = page.run("(async () => (await specsOf('')))()")
+    for name, chart in specs.items():
+        if not name.startswith("sweep-"):
+            continue
+        column = "distance_max" if "-distance" in name else "max_principal_stretch"
+        for point in (p for layer in chart["page"]["layer"] for p in layer["data"]["values"]):
+            if "cell" in point and "-time" not in name:
+                run = runs[point["cell"]]
+                value, limit = float(run[column]), float(run["limit"])
+                far = column == "distance_max"
+                right, floor = (1000 * value, 1e-6) if far else (100 * (value - 1 - limit), 1e-7)
+                yield (name, point["cell"]), point["y"], max(right, floor), DRAWN_TO
+
+
+def in_energies(folder, steps):
+    """The same of the energies in numbers: of each run's first step and last, in mJ."""
+    firsts, lasts = set(), set()
+    for of in steps.values():
+        told = [s for s in of if s["kinetic_energy"]]
+        if told:
+            sums = [sum(float(s[f"{part}_energy"]) for part in PARTS) for s in (told[0], told[-1])]
+            firsts.add(1000 * sums[0])
+            lasts.add(1000 * sums[1])
+    for line in (folder / "energy.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split(" | ")]
+        if len(cells) > 7 and cells[2].isdigit():
+            for shown, known in ((cells[4], firsts), (cells[6], lasts)):
+                right = min(known, key=lambda value: abs(value - float(shown)))
+                yield line, float(shown), right, 1e-3
+
+
+PARTS = ("kinetic", "gravity", "membrane", "bending", "contact")
+
+
+@pytest.mark.slow
+def test_numbers_of_hard_cases_sweeps_and_energies_trace_to_rows(failing):
+    folder, page = failing
+    runs = {run["cell"]: run for run in read(folder, "runs.csv")}
+    steps, chosen = {}, random.Random(0)
+    for step in read(folder, "steps.csv"):
+        steps.setdefault(step["cell"], []).append(step)
+    for found in (in_matrix(page, runs), in_sweeps(page, runs), in_energies(folder, steps)):
+        every = list(found)
+        assert every
+        for where, shown, right, share in chosen.sample(every, min(50, len(every))):
+            assert shown == pytest.approx(right, rel=share), where
 
 
 def test_numbers_trace_to_rows(page, field):
@@ -363,6 +443,38 @@ def test_names_are_text_and_nothing_else(browser, tmp_path):
         == 0
     )
     assert shown.run("document.querySelectorAll('script:not([data-specs])').length") == 4
+    shown.close()
+
+
+def test_a_kind_of_failure_is_told_and_chosen(browser, tmp_path):
+    failed = {"outcome": "violated", "failure": "inverted", "failure_step": "3"}
+    measured = {"min_principal_stretch": "0.25", "jitter": "0.125"}
+    shown, _ = opened(browser, report_of(tmp_path, row("admm", **failed, **measured), row("cvxpy")))
+    assert "inverted, first in step 3" in each(shown, "#cells .sign", "e.title")[0]
+    select = "document.querySelector('#filters select[name=failure]')"
+    shown.run(f"{select}.value = 'inverted'; {select}.dispatchEvent(new Event('change'))")
+    assert [cells[0] for cells in rows_of(shown)] == ["admm"]
+    shown.run("document.querySelector('#cells tr[data-cell]').click()")
+    said = shown.run("byId('drawer').innerText").split("\n")
+    for name, value in (
+        ("failure", "inverted, first in step 3"),
+        ("least principal stretch", "0.250"),
+        ("jitter", "0.13"),
+    ):
+        assert said[said.index(name) + 1] == value
+    shown.close()
+
+
+def test_claims_of_a_folder_stand_on_its_page(browser, tmp_path):
+    head = "claim,where,words,verdict,numbers,from another side\n"
+    lines = "T2,5.1,It is <b>fast</b>.,holds,2 times,\nT1,5,It holds.,does not hold here,3 mm,\n"
+    (tmp_path / "claims.csv").write_text(head + lines)
+    shown, _ = opened(browser, report_of(tmp_path, row("admm")))
+    verdicts = "#claims tbody td:nth-child(4)"
+    assert each(shown, verdicts, "e.textContent") == ["✓ holds", "✗ does not hold here"]
+    assert each(shown, "#claims tbody td:nth-child(3)", "e.textContent")[0] == "It is <b>fast</b>."
+    shown.run("document.querySelector('#claims th button').click()")
+    assert each(shown, verdicts, "e.textContent") == ["✗ does not hold here", "✓ holds"]
     shown.close()
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cache, partial
 from itertools import islice
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from strainbench.report.drawing import Sheet
 
 __all__ = [
     "Chart",
+    "Makers",
     "Target",
     "chart_sheets",
     "convergence",
@@ -36,26 +39,43 @@ ENDINGS = (".svg", ".png")
 MOST = 8  # charts of a kind in files: each takes a third of a second
 
 
-def chart_sheets(
-    folder: Path, runs: pd.DataFrame, steps: pd.DataFrame, speed: Iterable[Chart]
-) -> list[Sheet]:
+@dataclass(frozen=True)
+class Makers:
+    """What makes the charts of a results folder, each kind once for a target: files and page
+    share them."""
+
+    speed: Callable[[Target, str], list[Chart]]
+    profile: Callable[[Target], list[Chart]]
+    growth: Callable[[Target], list[Chart]]
+    sweep: Callable[[Target], dict[str, list[Chart]]]
+    energy: Callable[[Target, float], list[Chart]]
+
+    @classmethod
+    def of(cls, folder: Path, runs: pd.DataFrame, steps: pd.DataFrame) -> Makers:
+        """Rows as `strainbench.report.measures.measured` returns them, projections as
+        `strainbench.report.steps.newest_steps` does."""
+        return cls(
+            cache(partial(work_precision, runs)),
+            cache(partial(profiles, runs, steps)),
+            cache(partial(growth, runs)),
+            cache(partial(sweep, runs)),
+            cache(partial(energy, folder, runs)),
+        )
+
+
+def chart_sheets(folder: Path, make: Makers) -> list[Sheet]:
     """Sheets of speed-accuracy, profile, growth, energy and sweep-<setting>, as SVG and PNG.
 
     Scenes of which there are several have a file each, `-2` and so on; their meshes and limits
     stand beside each other. Of each kind the first MOST charts have files; the page has all.
-
-    Parameters
-    ----------
-    runs : as `strainbench.report.measures.measured` returns them
-    steps : as `strainbench.report.steps.newest_steps` does
-    speed : as `work_precision` makes them for a page
     """
+    page = Target.PAGE
     named = {
-        **_by_figure(speed),
-        **{chart.name: [chart] for chart in profiles(runs, steps, Target.PAGE)},
-        **{chart.name: [chart] for chart in growth(runs, Target.PAGE)[:MOST]},
-        "energy": energy(folder, runs, Target.PAGE)[:MOST],
-        **{f"sweep-{key}": charts[:MOST] for key, charts in sweep(runs, Target.PAGE).items()},
+        **_by_figure(make.speed(page, "distance")),
+        **{chart.name: [chart] for chart in make.profile(page)},
+        **{chart.name: [chart] for chart in make.growth(page)[:MOST]},
+        "energy": make.energy(page, 0.0)[:MOST],
+        **{f"sweep-{key}": charts[:MOST] for key, charts in make.sweep(page).items()},
     }
     return [
         sheet(charts, [folder / (name + ending) for ending in ENDINGS], 2)

@@ -30,6 +30,14 @@ constraints."""
 TOOLTIP = {"name": "method", "shown": "value", "outcome": "outcome", "said": "time a projection"}
 
 
+USED = [
+    *("cell", "scenario", "scenario_parameters", "mode", "tolerance", "steps_asked", "steps_done"),
+    *("solver", "mesh", "bound", "limit", "ending", "done", "why", "time"),
+    *("distance_max", "max_principal_stretch"),
+]
+"""Columns that the charts are of: rows of all are slow to take apart."""
+
+
 @dataclass(frozen=True)
 class Measure:
     """What is drawn against the setting; anything below `floor` is drawn there."""
@@ -59,7 +67,7 @@ def sweep(runs: pd.DataFrame, target: Target) -> dict[str, list[Chart]]:
     ----------
     runs : as `strainbench.report.measures.measured` returns them
     """
-    return {key: list(_charts(key, rows, target)) for key, rows in sweeps(runs).items()}
+    return {key: list(_charts(key, rows, target)) for key, rows in sweeps(runs[USED]).items()}
 
 
 def _charts(key: str, rows: pd.DataFrame, target: Target) -> Iterator[Chart]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +39,12 @@ Boxes = NDArray[np.float64]
 
 def width(text: str, size: float) -> float:
     """Of a line of text."""
-    known = (WIDTHS[ord(c) - 32] if 32 <= ord(c) < 127 else OTHER for c in plain(text))
-    return sum(known) * size / 1000
+    return _thousandths(text) * size / 1000
+
+
+@lru_cache(maxsize=10_000)  # names and words come again on every chart
+def _thousandths(text: str) -> int:
+    return sum(WIDTHS[ord(c) - 32] if 32 <= ord(c) < 127 else OTHER for c in plain(text))
 
 
 def plain(text: str) -> str:

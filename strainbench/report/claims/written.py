@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 from strainbench.document import Code, Document, Prose, Strong, Table
+from strainbench.document.html import page
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.claims import cost, projection, scheme, table1
@@ -25,7 +26,7 @@ numbers by a rule in `strainbench/report/claims`; ratios hold within a folder, s
 
 
 def write_claims(root: Path) -> tuple[str, list[Path]]:
-    """claims.md and claims.csv in `root`, from the folders of results below it; and a line of it.
+    """claims.md, .html and .csv in `root`, from the folders of results below it; a line of them.
 
     Raises
     ------
@@ -33,7 +34,12 @@ def write_claims(root: Path) -> tuple[str, list[Path]]:
         If there is no such folder.
     """
     found = audit(root)
-    files = {"claims.md": markdown(document(found)), "claims.csv": csv(table(found))}
+    told = document(found)
+    files = {
+        "claims.md": markdown(told),
+        "claims.csv": csv(table(found)),
+        "claims.html": page(told),
+    }
     for name, text in files.items():
         write_whole(root / name, text.encode())
     return counted(found), [root / name for name in files]

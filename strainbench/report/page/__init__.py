@@ -14,11 +14,12 @@ from strainbench.document import Strong
 from strainbench.document.html import templates
 from strainbench.escape import plain
 from strainbench.progress import Track, untracked
+from strainbench.report.charts import Makers
 from strainbench.report.identity import look
 from strainbench.report.measures import OPTIMAL, numbers
 from strainbench.report.names import percent, played
 from strainbench.report.page import data
-from strainbench.report.page.drawn import Drawn, Speed
+from strainbench.report.page.drawn import Drawn
 from strainbench.report.page.headline import headline
 from strainbench.report.page.maps import map_of
 from strainbench.report.page.races import CASE, with_cases
@@ -47,7 +48,7 @@ def report_page(
     failed: pd.DataFrame,
     machines: Machines,
     files: Sequence[str],
-    speed: Speed,
+    make: Makers,
     track: Track = untracked,
 ) -> str:
     """The page of a results folder.
@@ -57,13 +58,13 @@ def report_page(
     runs : as `strainbench.report.load_runs` has them
     failed : as `strainbench.report.failures.failures` has it
     files : names of what else was written, to be linked
-    speed : makes the charts of time against an accuracy
+    make : makes the charts
     """
     steps = newest_steps(folder, runs)
     steps = numbers(steps[[name for name in READ if name in steps]])
     found = with_cases(runs)
     mapped = map_of(folder, runs)
-    parts = sections(folder, found, steps, failed, machines, speed, bool(mapped), track)
+    parts = sections(folder, found, steps, failed, machines, make, bool(mapped), track)
     page: str = _template().render(
         title=folder.resolve().name,
         meta=_meta(found),
@@ -118,11 +119,11 @@ def _payload(
 
 
 def _specs(charts: Iterable[Drawn]) -> dict[str, str]:
-    """Packed, those apart that a page needs at different times: by target and accuracy."""
+    """Packed by accuracy, which a page needs at different times; a chart's targets side by side,
+    as they share most of their data and gzip sees no further than 32 kB."""
     packs: dict[str, dict[str, object]] = {}
     for chart in charts:
-        for target, spec in chart.specs.items():
-            packs.setdefault(f"{target}-{chart.about.get('against', '')}", {})[chart.name] = spec
+        packs.setdefault(chart.about.get("against", ""), {})[chart.name] = chart.specs
     return {name: data.packed(specs, data.DRAWN) for name, specs in packs.items()}
 
 

@@ -30,7 +30,7 @@ function answer() {
 
 function missing(time, far) {
   const parts = [];
-  const factor = (value) => digits(value, value < 1.1 ? 3 : 2);
+  const factor = (value) => (value < 1e5 ? digits(value, value < 1.1 ? 3 : 2) : value.toExponential(1).replace("+", ""));
   if (time > 1) parts.push(`takes ${factor(time)}× the time`);
   if (far > 1) parts.push(`stops at ${factor(far)}× the distance`);
   return parts.join(" and ");

@@ -24,8 +24,8 @@ async function drawCharts() {
   for (let figure = nextChart(); figure; figure = nextChart()) {
     const name = figure.dataset.chart;
     const target = narrow.matches ? "phone" : "page";
-    const specs = await specsOf(`${target}-${data.charts[name].against ?? ""}`);
-    drawn.set(name, { target, view: await drawChart(figure, specs[name]) });
+    const specs = await specsOf(data.charts[name].against ?? "");
+    drawn.set(name, { target, view: await drawChart(figure, specs[name][target]) });
     figure.classList.add("drawn");
     await new Promise((done) => setTimeout(done));
   }

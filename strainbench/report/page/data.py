@@ -42,6 +42,8 @@ CELL = {
     "gap": "relative_gap_max",
     "violation": "max_violation",
     "older": "older",
+    "failure": "failure",
+    "since": "failure_step",
 }
 """What a cell is called on the page, and its column."""
 

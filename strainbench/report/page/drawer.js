@@ -51,6 +51,7 @@ function facts(cell) {
   const quartiles = cell.low === null ? "" : ` (${milliseconds(cell.low)} to ${milliseconds(cell.high)})`;
   return [
     ["case", [cell.scene, cell.size, cell.limit && `limit ${cell.limit}`, cell.mode].filter(Boolean).join(", ")],
+    ["failure", failureOf(cell)],
     ["steps", `${cell.done} of ${cell.planned}`],
     ["time, median", cell.time === null ? "" : `${milliseconds(cell.time)} ms${quartiles}`],
     ["mean of all steps", cell.mean === null ? "" : `${milliseconds(cell.mean)} ms`],
@@ -59,6 +60,8 @@ function facts(cell) {
     ["certified at most", row.distance_bound_max === null ? "" : `${digits(1000 * row.distance_bound_max)} mm`],
     ["violation, gap", [cell.violates, cell.gap === null ? "" : digits(cell.gap)].filter(Boolean).join(", ")],
     ["iterations", row.iterations_mean === null ? "" : digits(row.iterations_mean, 4)],
+    ["least principal stretch", row.min_principal_stretch === null ? "" : digits(row.min_principal_stretch, 3)],
+    ["jitter", row.jitter === null ? "" : scientific(row.jitter)],
     ["unknowns, limits", [row.variables, row.constraints].filter((n) => n !== null).join(", ")],
     ["peak memory", row.peak_memory_mb === null ? "" : `${digits(row.peak_memory_mb, 3)} MB`],
     ["older", cell.older && `measured ${cell.older}`],

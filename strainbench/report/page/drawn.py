@@ -11,15 +11,7 @@ from typing import Any
 import pandas as pd
 
 from strainbench.progress import Track
-from strainbench.report.charts import (
-    Chart,
-    Target,
-    convergence,
-    energy,
-    growth,
-    profiles,
-    sweep,
-)
+from strainbench.report.charts import Chart, Makers, Target, convergence
 from strainbench.report.page.races import CASE
 
 ACCURACIES = ("distance", "gap", "violation")
@@ -29,8 +21,6 @@ KEYS = {"scene": "scene", "mode": "mode", "bound": "limit", "aim": "aim", "mesh"
 """What the page calls the columns of a case."""
 Case = tuple[str, ...]
 Draw = Callable[[Target], Sequence[Chart]]
-Speed = Callable[[Target, str], list[Chart]]
-"""Makes the charts of time against an accuracy, each once."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +40,7 @@ class Drawn:
 
 
 def drawings_of(
-    folder: Path, runs: pd.DataFrame, steps: pd.DataFrame, speed: Speed, track: Track
+    folder: Path, runs: pd.DataFrame, make: Makers, track: Track
 ) -> dict[str, list[Drawn]]:
     """The charts of each section.
 
@@ -59,12 +49,12 @@ def drawings_of(
     runs : with what `with_cases` adds
     """
     ways: list[tuple[str, str, Draw]] = [
-        *(("speed", against, partial(_against, speed, against)) for against in ACCURACIES),
-        ("profile", "", partial(profiles, runs, steps)),
-        ("profile", "", partial(growth, runs)),
-        ("failures", "", lambda target: [c for own in sweep(runs, target).values() for c in own]),
+        *(("speed", against, partial(_against, make, against)) for against in ACCURACIES),
+        ("profile", "", make.profile),
+        ("profile", "", make.growth),
+        ("failures", "", lambda target: [c for own in make.sweep(target).values() for c in own]),
         ("convergence", "", partial(_convergence, folder)),
-        ("convergence", "", lambda target: energy(folder, runs, target, LEAST)),
+        ("convergence", "", lambda target: make.energy(target, LEAST)),
     ]
     cases = dict(zip(runs["cell"], zip(*(runs[name] for name in CASE), strict=True), strict=True))
     found: dict[str, list[Drawn]] = {}
@@ -73,8 +63,8 @@ def drawings_of(
     return found
 
 
-def _against(speed: Speed, against: str, target: Target) -> list[Chart]:
-    return speed(target, against)
+def _against(make: Makers, against: str, target: Target) -> list[Chart]:
+    return make.speed(target, against)
 
 
 def _drawn(draw: Draw, cases: Mapping[str, Case], against: str) -> Iterator[Drawn]:

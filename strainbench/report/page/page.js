@@ -1,6 +1,6 @@
 // Filters, chips, charts: what is chosen stands in the hash, everything follows it.
 const BLOCK = ["scene", "mode", "limit", "aim"];
-const FILTERS = [...BLOCK, "size", "ending"];
+const FILTERS = [...BLOCK, "size", "ending", "failure"];
 const AGAINST = { distance: "distance to the optimum", gap: "relative gap", violation: "violation of the limits" };
 const MANY = 6; // blocks: beyond, the page begins with the first
 const blockOf = (cell) => JSON.stringify(BLOCK.map((name) => cell[name]));
@@ -38,8 +38,8 @@ function refresh() {
 }
 
 function filters() {
-  const labels = { ending: "outcome", aim: "tolerance" };
-  const options = { scene: data.scenes, mode: data.modes, limit: data.limits, aim: data.aims, size: data.sizes, ending: RANK.filter((ending) => data.cells.some((cell) => cell.ending === ending)) };
+  const labels = { ending: "outcome", aim: "tolerance", failure: "kind of failure" };
+  const options = { scene: data.scenes, mode: data.modes, limit: data.limits, aim: data.aims, size: data.sizes, ending: RANK.filter((ending) => data.cells.some((cell) => cell.ending === ending)), failure: distinct(data.cells.map((cell) => cell.failure)).sort() };
   for (const name of FILTERS) {
     if (options[name].length < 2) continue;
     const all = el("option", { value: "" }, `every ${labels[name] ?? name}`);

@@ -40,7 +40,8 @@ function mark(method) {
 const named = (method) => el("span", { class: "method" }, mark(method), method);
 const sign = (cell) =>
   el("span", { class: `sign ${cell.ending.replaceAll(" ", "-")}`, title: said(cell) }, cell.sign);
-const said = (cell) => [WORDS[cell.ending], cell.why].filter(Boolean).join(": ");
+const said = (cell) => [WORDS[cell.ending], cell.why, failureOf(cell)].filter(Boolean).join(": ");
+const failureOf = (cell) => cell.failure && `${cell.failure}${cell.since === null ? "" : `, first in step ${cell.since}`}`;
 
 // Two significant digits, zeros at the end kept, no powers of ten.
 function digits(value, count = 2) {

@@ -16,17 +16,19 @@ from strainbench.document import Items, Part, Picture, Prose, Table
 from strainbench.document.html import html
 from strainbench.progress import Track
 from strainbench.report import warm
-from strainbench.report.charts import scores
+from strainbench.report.charts import Makers, scores
 from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.local import local_table
 from strainbench.report.machine import machine_section
-from strainbench.report.page.drawn import Drawn, Speed, drawings_of
+from strainbench.report.page.claimed import claims_table
+from strainbench.report.page.drawn import Drawn, drawings_of
 from strainbench.report.sweep import BEYOND, sweep_tables
 from strainbench.report.table import LOCAL, OLDER, details, ledger_table, older, reasons
 
-OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md", "local.md"}
+OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md", "local.md", "claims.md"}
 HEAVY = 1_500_000  # bytes of a folder's pictures that stand in the page; the others are linked
+MOST = 500  # lines of sweeps in numbers that stand in the page
 NOTE = """\
 ✓ optimal on every step (violation at most {violation}, relative gap at most {gap}); ○ within the
 limits on every step, not optimal; ✗ a limit violated, out of time or no answer. Time: the median
@@ -59,6 +61,11 @@ HEADS = {
         "Convergence and energy",
         "How far an answer is from the optimum as time goes on; what happens to the energy.",
     ),
+    "claims": (
+        "Claims of the papers",
+        "✓ holds, ○ holds under conditions, ✗ does not hold here, - not testable here, ? not "
+        "measured yet; what each verdict rests on stands beside it.",
+    ),
     "pictures": ("Pictures", "Of the scenes."),
     "protocol": (
         "Protocol and machine",
@@ -87,21 +94,22 @@ def sections(
     steps: pd.DataFrame,
     failed: pd.DataFrame,
     machines: Machines,
-    speed: Speed,
+    make: Makers,
     mapped: bool,
     track: Track,
 ) -> list[Section]:
     """Those that have something to show."""
-    drawings = drawings_of(folder, runs, steps, speed, track)
+    drawings = drawings_of(folder, runs, make, track)
     hard = [name for name, there in (("matrix", len(failed)), ("maps", mapped)) if there]
     boxes: dict[str, Sequence[str]] = {"table": ("table1", "cells"), "failures": hard}
-    swept = _folded("Sweeps in numbers", sweep_tables(runs), Prose(BEYOND))
+    swept = _swept(runs)
     bodies = {
         "speed": Markup(),
         "table": _note(runs) + html(warm.table(runs), 3),
         "profile": Markup().join(html(table, 3) for table in scores(runs, steps)),
         "failures": _signs(failed, runs) + swept,
         "convergence": _folded("Energies in numbers", [energy_table(folder, runs)]),
+        "claims": html(claims_table(folder), 3),
         "pictures": _pictures(folder),
         "protocol": _protocol(folder, runs, machines),
     }
@@ -127,6 +135,14 @@ def _signs(failed: pd.DataFrame, runs: pd.DataFrame) -> Markup:
     first = runs.iloc[0]
     said = EXPLANATION.format(violation=first["violation_threshold"], gap=first["gap_threshold"])
     return html(Prose(said.replace("\n\n", " ")))
+
+
+def _swept(runs: pd.DataFrame) -> Markup:
+    """The sweeps in numbers; a link to their file where they are too many to stand in the page."""
+    tables = sweep_tables(runs)
+    if sum(len(table.lines) for table in tables) > MOST:
+        return Markup('<p>Sweeps in numbers: <a href="{0}">{0}</a></p>').format("sweeps.md")
+    return _folded("Sweeps in numbers", tables, Prose(BEYOND))
 
 
 def _folded(title: str, parts: Iterable[Part], *before: Part) -> Markup:

@@ -100,7 +100,7 @@ function drawCells(cells, all = false) {
     number("distance", "mm", "mm", (cell) => cell.distance),
     number("gap", "", "gap", (cell) => cell.gaps, { wide: true }),
     number("violation", "strain", "violation", (cell) => cell.violates, { wide: true }),
-    { name: "why", class: "soft wide", text: (cell) => cell.why },
+    { name: "why", class: "soft wide", text: (cell) => [cell.why, cell.failure].filter(Boolean).join("; ") },
   ].filter(Boolean);
   const more = el("button", { type: "button", class: "more", onclick: () => drawCells(cells, true) }, `Show all ${rows.length}`);
   byId("cells").replaceChildren(
