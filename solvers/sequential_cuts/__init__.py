@@ -1,4 +1,4 @@
-"""Sequential convex programming within cuts (Kovalsky et al. 2014; Wang et al. 2016).
+"""Sequential convex programming within cuts (Kovalsky et al. 2014).
 
 S. Kovalsky, N. Aigerman, R. Basri, Y. Lipman, "Controlling singular values with semidefinite
 programming", ACM Trans. Graph. 33(4), 2014. Lower bounds on stretch are not convex. At positions
@@ -30,7 +30,7 @@ from strainbench.solver.solver import held_still
 
 @dataclass(frozen=True)
 class SequentialCuts(Solver):
-    """Sequential convex programming within cuts (Kovalsky et al. 2014; Wang et al. 2016).
+    """Sequential convex programming within cuts (Kovalsky et al. 2014).
 
     Of several starts the answer with the least objective. A start that is not within the limits is
     brought there first: the same programs with one slack on all lower bounds, at a price. Where no

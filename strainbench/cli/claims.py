@@ -21,7 +21,9 @@ def audit_claims(
     if measure:
         for command in missing(results):
             say(command)
-            subprocess.run([sys.executable, "-m", *shlex.split(command)], check=False)
+            program, *words = shlex.split(command)
+            module = ["-m", program] if program != "python" else []
+            subprocess.run([sys.executable, *module, *words], check=False)
     told, files = write_claims(results)
     say(told)
     say(f"written: {', '.join(str(file) for file in files)}")

@@ -35,6 +35,13 @@ class Evidence:
         of_scene = pd.DataFrame([settings(t) for t in runs["scenario_parameters"]], runs.index)
         return runs.assign(**of_scene[of_scene.columns.difference(runs.columns)])
 
+    def table(self, folder: str, name: str) -> pd.DataFrame:
+        """A CSV file of a study."""
+        file = self.root / folder / name
+        if not file.exists():
+            raise NotThereError(f"{folder} holds no {name}")
+        return pd.read_csv(file)
+
     def cells(self, folder: str, **wanted: object) -> pd.DataFrame:
         """The cells of a folder with these values in these columns, tuples for one of several.
 

@@ -10,7 +10,7 @@ from strainbench.document import Code, Document, Prose, Strong, Table
 from strainbench.document.html import page
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
-from strainbench.report.claims import cost, projection, scheme, table1
+from strainbench.report.claims import cost, hernandez, projection, scheme, table1
 from strainbench.report.claims.claim import CLAIMS, PROGRAM, Claim, Finding, Verdict
 from strainbench.report.claims.evidence import Evidence
 
@@ -18,7 +18,7 @@ PAPERS = {
     "T": "Tang, Coros and Thomaszewski 2022",
     "H": "Hernandez, Cirio, Perez and Otaduy 2013",
 }
-MODULES = (projection, scheme, table1, cost)
+MODULES = (projection, scheme, table1, cost, hernandez)
 """Their import registers the claims."""
 ABOUT = """\
 What the papers claim, in our words, beside what is measured here. Each verdict follows from the
@@ -54,11 +54,11 @@ def audit(root: Path) -> list[tuple[Claim, Finding]]:
 
 
 def missing(root: Path) -> list[str]:
-    """The commands of `strainbench` that claims without a verdict need, with results in `root`."""
+    """The commands that claims without a verdict need, with results in `root`."""
     unmeasured = (c for c, f in audit(root) if f.verdict is Verdict.UNMEASURED)
     commands = dict.fromkeys(command for claim in unmeasured for command in claim.commands)
-    place = f"--results {shlex.quote(str(root))}/"
-    return [c.replace("--results results/", place) for c in commands if c.startswith(PROGRAM)]
+    place = f" {shlex.quote(str(root))}/"
+    return [c.replace(" results/", place) for c in commands if c.startswith((PROGRAM, "python "))]
 
 
 def counted(found: list[tuple[Claim, Finding]]) -> str:
