@@ -15,10 +15,11 @@ from strainbench.studies.duel.measure import FACTORISATION, IMPLICIT_EULER
 from strainbench.studies.duel.racer import Racer
 
 EXPLANATION = (
-    "One thread; the methods take turns on each frame, in one process. Seconds are the median of "
-    "all projections, with their quartiles; set-up is apart. Times faster is the first method's median "
-    "over that of the row; CPU is the process's own time, which another's load changes less. "
-    "Violation, gap and distance to the optimum are the referee's, the worst over the frames."
+    "One thread; the methods take turns on each frame, in one process. Seconds are the median "
+    "of all projections, with their quartiles; set-up is apart. Times faster is the first "
+    "method's median over that of the row; CPU is the process's own time, which another's load "
+    "changes less. Violation, gap and distance to the optimum are the referee's, the worst over "
+    "the frames."
 )
 VERSIONS = (
     "Each version has a process of its own, and they take turns. Times faster is "
