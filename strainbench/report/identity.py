@@ -118,7 +118,7 @@ LOOKS = {
         Look(Family.NLP, "ipopt", "#C04A00", _regular(3, radius=1.2)),
         Look(Family.NLP, "linearized-qp", "#7A4A12", _regular(3, 1 / 2, radius=1.2), (5, 2)),
         Look(Family.NLP, "ipopt-edges", "#E8923A", _regular(3, 1 / 4, radius=1.2), (2, 2)),
-        Look(Family.NLP, "lcp-qp", "#5C3A1E", _regular(6, inner=0.4, radius=1.2), (6, 2, 1, 2)),
+        Look(Family.NLP, "lcp-qp", "#5C3A1E", _path([(-1, -1), (1, 1), (-1, 1)]), (6, 2, 1, 2)),
         Look(Family.NLP, "sequential-cuts", "#9C2B16", _regular(3, 3 / 4, radius=1.2), (8, 2)),
         Look(Family.FIRST_ORDER, "admm", "#00786A", _arms(4, 0)),
         Look(Family.FIRST_ORDER, "dykstra", "#3DB79B", _arms(4, 1 / 8), (5, 2)),
