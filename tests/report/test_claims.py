@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from strainbench.bench.records import RecordsError
 from strainbench.report.claims.claim import CLAIMS, Claim, Finding, Verdict
 from strainbench.report.claims.evidence import Evidence, NotThereError
 from strainbench.report.claims.written import audit, counted, missing, write_claims
@@ -65,3 +66,10 @@ def test_missing_rows_are_named():
         Evidence(RESULTS).one("fig4", solver="nobody")
     with pytest.raises(NotThereError, match="nowhere holds no results"):
         Evidence(RESULTS).one("nowhere")
+
+
+def test_damaged_records_are_no_missing_ones(tmp_path):
+    (tmp_path / "fig4").mkdir()
+    (tmp_path / "fig4" / "runs.csv").write_text("no,header\n1,2\n", encoding="utf-8")
+    with pytest.raises(RecordsError, match=r"runs\.csv"):
+        audit(tmp_path)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from strainbench.bench.records import RecordsError
+from strainbench.bench.records import RUNS
 from strainbench.report.energy import energies
 from strainbench.report.names import settings
 from strainbench.report.runs import load_runs
@@ -28,10 +28,9 @@ class Evidence:
         self.read = lru_cache(maxsize=None)(self._read)
 
     def _read(self, folder: str) -> pd.DataFrame:
-        try:
-            runs = load_runs(self.root / folder)
-        except (RecordsError, FileNotFoundError):
-            raise NotThereError(f"{folder} holds no results") from None
+        if not (self.root / folder / RUNS).exists():
+            raise NotThereError(f"{folder} holds no results")
+        runs = load_runs(self.root / folder)
         of_scene = pd.DataFrame([settings(t) for t in runs["scenario_parameters"]], runs.index)
         return runs.assign(**of_scene[of_scene.columns.difference(runs.columns)])
 
