@@ -16,10 +16,7 @@ Gravity g is added here, and only here.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +24,7 @@ import numpy as np
 from strainbench.arrays import FloatArray
 from strainbench.physics.body import Body
 from strainbench.physics.linear import LinearSolver, NotPositiveDefiniteError
+from strainbench.physics.stopwatch import Timed
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class _Iterate(NamedTuple):
     gradient: FloatArray
 
 
-class _Minimisation:
+class _Minimisation(Timed):
     """phi, as a function of the free vertices, and what it has cost so far."""
 
     def __init__(
@@ -77,16 +75,7 @@ class _Minimisation:
         self.inertial = inertial + step**2 * body.gravity
         self.inertia = body.mass / step**2
         self.evaluations = self.factorisations = 0
-        self.seconds = dict.fromkeys(("assembly", "factorisation", "line_search"), 0.0)
-
-    @contextmanager
-    def timed(self, part: str) -> Iterator[None]:
-        """Count the time within."""
-        begin = perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[part] += perf_counter() - begin
+        super().__init__()
 
     def at(self, x: FloatArray) -> _Iterate:
         """The iterate with these positions."""

@@ -105,7 +105,7 @@ def test_it_is_the_minimum_that_a_general_method_finds():
     options = {"maxiter": 500, "ftol": 1e-12}
     first = motion.x[free].ravel()
     other = minimize(phi, first, jac=True, method="SLSQP", constraints=within, options=options)
-    assert other.success
+    assert other.success or other.status == 8  # to rounding no descent is left
     assert np.any(room(other.x) < 1e-6), "no limit plays a part"
     assert np.abs(placed(other.x) - found).max() < 1e-7  # [m]
 

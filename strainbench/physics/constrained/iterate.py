@@ -3,10 +3,7 @@
 # ruff: noqa: E741 - l are multipliers
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
-from time import perf_counter
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +12,7 @@ from strainbench.arrays import FloatArray
 from strainbench.physics.body import GRAVITY, Body
 from strainbench.physics.equilibrium import add_limits_hessian
 from strainbench.physics.linear import LinearSolver, NotPositiveDefiniteError
+from strainbench.physics.stopwatch import Timed
 from strainbench.problem.problem import Problem
 
 
@@ -70,7 +68,7 @@ class Change(NamedTuple):
     length: float
 
 
-class Iteration:
+class Iteration(Timed):
     """phi within limits, as a function of the free vertices, and what it has cost so far.
 
     Attributes
@@ -97,16 +95,7 @@ class Iteration:
         self.work = 0.5 * float(body.mass[self.free].sum()) * speed**2
         self.damping, self.rough = 0.0, 0  # c, and iterations in a row with many halvings
         self.iterations = self.factorisations = self.evaluations = 0
-        self.seconds = dict.fromkeys(("assembly", "factorisation", "line_search"), 0.0)
-
-    @contextmanager
-    def timed(self, part: str) -> Iterator[None]:
-        """Count the time within."""
-        begin = perf_counter()
-        try:
-            yield
-        finally:
-            self.seconds[part] += perf_counter() - begin
+        super().__init__()
 
     def run(self, x: FloatArray) -> Point:
         """From x (n, 3) to a point that is solved.
