@@ -6,7 +6,7 @@ import ast
 
 import pytest
 
-from strainbench.sources import PACKAGES, ROOT, SUITE, closure, digest
+from strainbench.sources import PACKAGES, ROOT, SUITE, TELLING, closure, digest
 
 
 @pytest.fixture
@@ -86,6 +86,16 @@ def test_a_digest_follows_the_contents_and_not_the_place(write):
     two.write_text("a = 2")
     assert digest([one]) != digest([two])
     assert digest([one, two]) == digest([two, one])
+
+
+def test_nothing_that_measures_imports_the_rooms_that_only_tell():
+    """So an edit of a page makes no row look as if another version had measured it."""
+    measuring = [SUITE / name for name in ("bench", "physics", "referee", "scenario", "solver")]
+    measuring += [ROOT / name for name in PACKAGES[1:]]
+    files = [file for room in measuring for file in room.rglob("*.py")]
+    rooms = {f.relative_to(SUITE).parts[0] for f in closure(*files) if f.is_relative_to(SUITE)}
+    assert {"bench", "problem", "referee", "physics", "solver", "scenario"} <= rooms
+    assert rooms.isdisjoint(TELLING)
 
 
 def test_no_file_of_ours_depends_on_the_locale():
