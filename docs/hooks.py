@@ -139,6 +139,7 @@ def on_config(config: Any) -> Any:
     howto = [place for title, place in HOWTO.items() if title != INTRO]
     config["nav"] = [
         {"Start": "index.md"},
+        {"Use": "use.md"},
         {"Concepts": "concepts.md"},
         {"How to": ["howto/index.md", *howto, HOWTO[INTRO], "howto/figures.md"]},
         {"Examples": ["examples/index.md", *(f"examples/{name}.md" for name in EXAMPLES)]},
@@ -170,6 +171,8 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 USED: set[tuple[str, str]] = set()
+SOURCES = {"results/README.md": "results", "changelog.md": ".", "security.md": "."}
+"""Folders of the repository in which the pages lie that are not of docs/."""
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
@@ -182,13 +185,8 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
         USED.add((found[1], found[2]))
         return relinked(sections(found[1])[found[2]], ".", here)
 
-    text = WANTED.sub(section, markdown)
-    source = "results" if here == "results/README.md" else "."
-    return (
-        relinked(text, source, here)
-        if here in ("results/README.md", "changelog.md", "security.md")
-        else text
-    )
+    source = SOURCES.get(here, posixpath.join("docs", posixpath.dirname(here)))
+    return WANTED.sub(section, relinked(markdown, source, here))
 
 
 def on_post_build(**_: Any) -> None:
@@ -221,6 +219,8 @@ def page_of(path: str, anchor: str) -> str:
         return next((p for t, p in README.items() if f"#{slug(t)}" == anchor), "index.md")
     if path == "CONTRIBUTING.md":
         return next((p for t, p in HOWTO.items() if f"#{slug(t)}" == anchor), "howto/index.md")
+    if folder == "docs":
+        return name
     if folder in ("solvers", "scenarios") and stem:
         return f"{'methods' if folder == 'solvers' else 'scenes'}/{stem.replace('_', '-')}.md"
     if folder == "strainbench" and stem:

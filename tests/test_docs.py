@@ -101,8 +101,9 @@ def test_links_between_files_become_links_between_pages(tool):
     assert hooks.relinked("[e](swing-short/table1.md)", "results", "results/README.md") == (
         "[e](swing-short/table1.md)"
     )
-    assert (
-        hooks.relinked("[f](README.md#methods)", ".", "index.md") == "[f](methods/index.md#methods)"
+    assert hooks.relinked("[f](README.md#scenes)", ".", "index.md") == "[f](scenes/index.md#scenes)"
+    assert hooks.relinked("[g](../solvers/none.py) [h](concepts.md)", "docs", "use.md") == (
+        "[g](methods/none.md) [h](concepts.md)"
     )
 
 

@@ -1,4 +1,4 @@
-"""What the README and CONTRIBUTING tell a person to type works."""
+"""What the README, docs/use.md and CONTRIBUTING tell a person to type works."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ import pytest
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text()
 CONTRIBUTING = (ROOT / "CONTRIBUTING.md").read_text()
+USE = (ROOT / "docs/use.md").read_text()
+CONCEPTS = (ROOT / "docs/concepts.md").read_text()
 
 
 def blocks(text, language):
@@ -22,7 +24,7 @@ def blocks(text, language):
 
 COMMANDS = [
     line.removeprefix("$ ")
-    for block in blocks(README, "console")
+    for block in blocks(README + USE, "console")
     for line in block.splitlines()
     if line.startswith("$ strainbench")
 ]
@@ -32,7 +34,7 @@ def test_there_are_commands():
     assert len(COMMANDS) >= 4
 
 
-def test_commands_in_the_order_of_the_readme(tmp_path):
+def test_commands_in_their_order(tmp_path):
     (tmp_path / "mine.py").write_text(blocks(CONTRIBUTING, "python")[0])
     for command in COMMANDS:
         done = subprocess.run(
@@ -113,7 +115,7 @@ def test_distances_from_the_constrained_step_are_those_measured():
 
     measured = pd.read_csv(ROOT / "results/stability/constrained/shrinking/step.csv")
     head = "| | 1/30 s | 1/60 s | 1/120 s |"
-    table = README[README.index(head) :].partition("\n\n")[0].splitlines()[2:]
+    table = CONCEPTS[CONCEPTS.index(head) :].partition("\n\n")[0].splitlines()[2:]
     norms = {"mass norm": "mass", "as printed": "unweighted"}
     for line in table:
         name, *cells = [cell.strip() for cell in line.strip("|").split("|")]
@@ -125,7 +127,7 @@ def test_distances_from_the_constrained_step_are_those_measured():
     assert len(table) == 5
 
 
-@pytest.mark.parametrize("target", re.findall(r"`make ([a-z-]+)`", README))
+@pytest.mark.parametrize("target", sorted(set(re.findall(r"`make ([a-z-]+)`", README + USE))))
 def test_make_targets_exist(target):
     assert re.search(rf"^{target}:", (ROOT / "Makefile").read_text(), re.MULTILINE)
 
