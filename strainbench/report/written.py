@@ -19,6 +19,7 @@ from strainbench.report.local import local_table
 from strainbench.report.page import report_page
 from strainbench.report.page.races import with_cases
 from strainbench.report.paper import as_latex, chosen_methods
+from strainbench.report.printed import printed_tables
 from strainbench.report.runs import load_runs
 from strainbench.report.steps import newest_steps
 from strainbench.report.sweep import BEYOND, sweep_tables
@@ -48,6 +49,8 @@ def _texts(
         "table1.md": as_markdown(runs, machines),
         "table1.tex": as_latex(chosen_methods(runs, None)),
     }
+    if (printed := printed_tables(runs)).parts:
+        texts["table1-paper.md"] = markdown(printed)
     if swept := sweep_tables(runs):
         texts["sweeps.md"] = markdown(Document("Sweeps", [Prose(BEYOND), *swept]))
     failed = failures(folder, runs)

@@ -9,6 +9,7 @@ from strainbench.report.claims.claim import Finding, Verdict, at, claim
 from strainbench.report.claims.evidence import Evidence, NotThereError
 from strainbench.report.measures import COUNT, OUT_OF_TIME, duration, length
 from strainbench.report.numbers import power
+from strainbench.report.printed import PAPER_SECONDS, SIZES
 
 GROWTH = (
     at(
@@ -25,17 +26,6 @@ BY_DEFAULT = at(
 )
 TABLE1 = "make bench-paper PAPER=results/paper"
 PAPER = "paper"
-SIZES = (10, 20, 40, 60)
-PAPER_SECONDS = {
-    ("IE", 0.01): (0.017, 0.064, 0.361, 1.318),
-    ("SOCP", 0.01): (0.108, 0.285, 1.289, 4.060),
-    ("SOCP", 0.1): (0.107, 0.278, 1.242, 3.790),
-    ("NLP", 0.01): (0.436, 21.009, np.nan, np.nan),
-    ("NLP", 0.1): (0.405, 27.001, np.nan, np.nan),
-    ("GS", 0.01): (0.422, 7.184, 54.725, 100.033),
-    ("GS", 0.1): (0.016, 0.238, 6.311, 48.427),
-}
-"""Table 1 of the paper [s], by method and limit, at 10, 20, 40 and 60 cells a side."""
 
 
 def _by_size(seen: Evidence, folder: str, column: str, **wanted: object) -> pd.Series:
