@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from strainbench.studies.stability.axis import Axis, parse_axis
-from strainbench.studies.stability.refine import inferred, wanted
+from strainbench.studies.stability.refine import coarseness, inferred, wanted
 from strainbench.studies.stability.words import boundary
 
 
@@ -104,3 +104,20 @@ def test_boundaries_in_words():
     del always[0, 0]
     always[2, 0] = False
     assert boundary(x, y, always)[0] == "holds up to limit 2% (fails at 3%) at step 1/4"
+
+
+def test_what_is_not_known_of_every_level_is_not_said_of_it():
+    x = Axis("limit", ("1%", "2%", "3%"), ("1%", "2%", "3%"))
+    y = Axis("step", ("1/60",), ("1/60",))
+    (said,) = boundary(x, y, {(0, 0): True, (2, 0): True})
+    assert said == "holds at every limit run everywhere"
+
+
+def test_coarse_lattices_come_first():
+    shape = (20, 9)
+    points = sorted(wanted(shape, {}, stride=2), key=lambda point: -coarseness(shape, point))
+    assert set(points[:4]) == {(0, 0), (0, 8), (19, 0), (19, 8)}
+    strides = [coarseness(shape, point) for point in points[4:]]
+    assert strides == sorted(strides, reverse=True)
+    assert coarseness(shape, (16, 8)) == 16
+    assert coarseness(shape, (16, 3)) == 1

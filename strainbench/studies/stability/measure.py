@@ -21,7 +21,7 @@ from strainbench.bench.runner import Runner, Settings
 from strainbench.progress import Observer
 from strainbench.report.measures import COUNT, finish, numbers, timing
 from strainbench.studies.stability.axis import Axis
-from strainbench.studies.stability.refine import Point, inferred, wanted
+from strainbench.studies.stability.refine import Point, coarseness, inferred, wanted
 
 LONG, FEWEST = 2.0, 40
 """Seconds of a scene's time, and steps: within the longer of them outcomes settle. Counts run out
@@ -137,7 +137,9 @@ def measure(
             if time.monotonic() > until:
                 found.open = len(asked)
                 return
-            batch = sorted(asked, key=lambda a: (a[1], a[0]))[:BATCH]
+            batch = sorted(asked, key=lambda a: (-coarseness(found.shape, a[1]), a[1], a[0]))[
+                :BATCH
+            ]
             cells = {(method, point): plan(point)[method] for method, point in batch}
             yield list(cells.values())
             spots = read_spots(settings.folder, [cell.key for cell in cells.values()])

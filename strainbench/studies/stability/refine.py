@@ -23,6 +23,12 @@ def wanted(shape: Point, known: Mapping[Point, str], stride: int = STRIDE) -> se
     return missing or _closure(shape, known, inferred(shape, known, stride))
 
 
+def coarseness(shape: Point, point: Point) -> int:
+    """The stride of the coarsest lattice that a point is on: those first give a whole map early."""
+    ends = max(shape)  # coarser than any point within
+    return min(i & -i if 0 < i < n - 1 else ends for n, i in zip(shape, point, strict=True))
+
+
 def inferred(shape: Point, known: Mapping[Point, str], stride: int = STRIDE) -> dict[Point, str]:
     """The outcomes of all points in blocks whose corners agree, and of those that are known."""
     found: dict[Point, str] = {}

@@ -38,7 +38,8 @@ def _line(x: Axis, held: Sequence[bool | None]) -> str:
     changes = [(i, j) for (i, a), (j, b) in pairwise(known) if a != b]
     name, at = x.key, x.shown
     if not changes:
-        return f"{'holds' if known[0][1] else 'fails'} at every {name}"
+        run = "" if len(known) == len(held) else " run"
+        return f"{'holds' if known[0][1] else 'fails'} at every {name}{run}"
     if len(changes) > 1:
         return f"irregular between {name} {at[changes[0][0]]} and {at[changes[-1][1]]}"
     below, above = changes[0]
