@@ -35,7 +35,7 @@ def shown_runs(folder: Path) -> list[Row]:
         If the records are damaged.
     """
     machines, now = read_machines(folder), cache(content_of)  # once for all rows that ask alike
-    changes = {name: _changed_packages(facts) for name, facts in machines.items()}
+    changes = {name: changed_packages(facts) for name, facts in machines.items()}
     kept: dict[tuple[str, ...], Row] = {}
     for row in latest_runs(folder).values():
         row = row | {"older": _older_source(row, now)}
@@ -88,7 +88,7 @@ def _older_source(row: Row, now: Callable[[str, tuple[str, ...]], str]) -> str:
     return ""
 
 
-def _changed_packages(facts: Mapping[str, object]) -> str:
+def changed_packages(facts: Mapping[str, object]) -> str:
     """How a machine's packages differ from those installed."""
     packages = facts.get("packages")
     if not isinstance(packages, Mapping):
