@@ -16,7 +16,7 @@ from pathlib import Path
 from strainbench.bench.cell import content_of
 from strainbench.bench.machine import installed
 from strainbench.bench.records import Row, latest_runs, read_machines
-from strainbench.sources import ROOT, suite_digest
+from strainbench.sources import ROOT, SUITE, suite_digest
 
 PLUGINS = ("scenario", "solver")
 SAME = (
@@ -89,12 +89,13 @@ def _older_source(row: Row, now: Callable[[str, tuple[str, ...]], str]) -> str:
 
 
 def changed_packages(facts: Mapping[str, object]) -> str:
-    """How a machine's packages differ from those installed."""
+    """How a machine's packages differ from those installed; ours is known by its sources."""
     packages = facts.get("packages")
     if not isinstance(packages, Mapping):
         return ""
     now = installed(packages)
-    changed = [f"{n} {packages[n]} (now {now[n]})" for n in packages if packages[n] != now[n]]
+    others = [name for name in packages if name != SUITE.name]
+    changed = [f"{n} {packages[n]} (now {now[n]})" for n in others if packages[n] != now[n]]
     return "with " + ", ".join(changed) if changed else ""
 
 
