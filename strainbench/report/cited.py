@@ -77,14 +77,14 @@ def as_macros(texts: Mapping[str, str]) -> str:
 def value(root: Path, name: str, entry: Entry) -> float:
     """The number that an entry leads to."""
     if "find" in entry:
-        return _found(root / entry["file"], name, entry["find"]) * entry.get("times", 1)
+        return _found(root / entry["file"], name, entry["find"]) * float(entry.get("times", 1))
     source = entry.get("folder") or entry["file"]
     column, what = entry["column"], f"{name}: {source}"
     table = _with_columns(tables(root / source), what, [*entry["where"], column])
     first = _cell(table, what, entry["where"], column)
     if over := entry.get("over"):
         first /= _cell(table, what, entry["where"] | over, column)
-    return first * entry.get("times", 1)
+    return first * float(entry.get("times", 1))
 
 
 def _found(path: Path, name: str, pattern: str) -> float:
@@ -130,7 +130,7 @@ def _with_columns(found: Sequence[pd.DataFrame], what: str, columns: Sequence[st
 def _cell(table: pd.DataFrame, what: str, where: Entry, column: str) -> float:
     """The value of the one row that a condition holds for."""
     rows = _where(table, where)
-    if len(rows) != 1 or pd.isna(rows[column].iloc[0]):
+    if len(rows) != 1 or rows[column].iloc[0] in ("", None) or pd.isna(rows[column].iloc[0]):
         told = ", ".join(f"{key} = {wanted}" for key, wanted in where.items())
         count = f"{len(rows)} rows" if len(rows) != 1 else f"no {column} in the row"
         raise NotCitedError(f"{what} has {count} with {told}, where one is asked")
