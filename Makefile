@@ -92,6 +92,7 @@ results: setup ## which folders of results/ are older than the code that they me
 
 paper: setup ## the article, its numbers, tables and figures read from results/: paper/build/article.pdf; needs LaTeX
 	$(BIN)/python -m strainbench.report.cited paper
+	@command -v pdflatex >/dev/null || { echo "The rest needs LaTeX: pdflatex, bibtex."; exit 1; }
 	cd paper && for pass in latex bibtex latex latex; do case $$pass in \
 		bibtex) bibtex -terse build/article;; \
 		*) pdflatex -interaction=batchmode -halt-on-error -output-directory=build article.tex;; \
