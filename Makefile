@@ -15,7 +15,7 @@ TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipo
 	--solver gauss-seidel,fast-projection,fast-projection-full-step,none
 
 .DEFAULT_GOAL := help
-.PHONY: help setup bench bench-paper field failures directions certificates test quick faults check coverage claims docs graph perf kernels report thumbnails clean
+.PHONY: help setup bench bench-paper field failures directions certificates test quick faults check coverage claims results paper docs graph perf kernels report thumbnails clean
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -86,6 +86,17 @@ coverage: setup ## what the tests reach, as a table and in results/local/coverag
 
 claims: setup ## what the papers claim beside what results/ holds, with verdicts: results/claims.md
 	$(BIN)/strainbench claims
+
+results: setup ## which folders of results/ are older than the code that they measure; their commands
+	$(BIN)/python -m strainbench.report.freshness results
+
+paper: setup ## the article, its numbers, tables and figures read from results/: paper/build/article.pdf; needs LaTeX
+	$(BIN)/python -m strainbench.report.cited paper
+	@command -v pdflatex >/dev/null || { echo "The rest needs LaTeX: pdflatex, bibtex."; exit 1; }
+	cd paper && for pass in latex bibtex latex latex; do case $$pass in \
+		bibtex) bibtex -terse build/article;; \
+		*) pdflatex -interaction=batchmode -halt-on-error -output-directory=build article.tex;; \
+		esac || exit 1; done
 
 docs: setup ## the documentation, into results/local/docs/index.html; broken links fail it
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict

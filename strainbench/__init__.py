@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from strainbench.solver.solve import solve
     from strainbench.solver.solver import Clock, Solution, Solver
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "Blocks",
     "Certificate",

@@ -24,6 +24,10 @@ from strainbench.escape import plain
 Plugin = TypeVar("Plugin")
 
 
+class ShadowedError(ValueError):
+    """Another package has the name of one of ours and is found before it."""
+
+
 class UnavailableError(ValueError):
     """A plug-in of ours that needs what is not installed."""
 
@@ -63,9 +67,10 @@ def _package(name: str) -> ModuleType:
     package = importlib.import_module(name)
     beside = Path(__file__).resolve().parent.parent / name
     if Path(package.__path__[0]).resolve() != beside:
-        raise ImportError(
-            f"the package {name} was found at {package.__path__[0]}, not at {beside}: "
-            f"another package of that name is in the way"
+        raise ShadowedError(
+            f"the package {name} was found at {package.__path__[0]}, not at {beside}: another "
+            "package of that name is in the way; start strainbench from another folder, or in a "
+            "virtual environment of its own"
         )
     return package
 

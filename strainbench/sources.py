@@ -16,8 +16,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 SUITE = Path(__file__).resolve().parent
 PACKAGES = ("strainbench", "solvers", "scenarios")
-TELLING = ("cli", "document", "render", "report", "studies")
-"""Rooms that show what was measured; no number of a row depends on them."""
+TELLING = ("cli", "document", "render", "report", "studies", "__init__.py")
+"""Rooms that show what was measured, and the face with the version: no number of a row depends on
+them, so a release alone makes no row older."""
 
 Import = tuple[int, str, str]
 """Level (0 is absolute), module, and the name taken from it, or "" for the module itself."""
@@ -100,11 +101,16 @@ def _modules(file: Path, level: int, module: str, name: str) -> Iterator[Path]:
 
 
 def _path(file: Path, package: str) -> list[Path]:
-    """Where an absolute import in `file` looks: beside it, and beside its outermost package."""
+    """Where an absolute import in `file` looks: beside it, and beside its outermost package.
+
+    Ours, which may be installed where all packages are, import none that lies beside them.
+    """
     if package in PACKAGES:
         return [ROOT]
     outside = next(folder for folder in file.parents if not (folder / "__init__.py").is_file())
-    return [outside] if outside == ROOT else [file.parent, outside]
+    if outside != ROOT:
+        return [file.parent, outside]
+    return [ROOT] if package == file.relative_to(ROOT).parts[0] or file.parent == ROOT else []
 
 
 def _defining(package: Path, name: str) -> Iterator[Path]:

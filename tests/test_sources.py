@@ -6,6 +6,7 @@ import ast
 
 import pytest
 
+from strainbench import sources
 from strainbench.sources import PACKAGES, ROOT, SUITE, TELLING, closure, digest
 
 
@@ -78,6 +79,17 @@ def test_a_file_that_does_not_parse_has_no_imports(write):
     mine = write("mine.py", "import helper\n)")
     write("helper.py", "")
     assert closure(mine) == [mine]
+
+
+def test_ours_do_not_follow_packages_that_are_installed_beside_them(write, monkeypatch, tmp_path):
+    monkeypatch.setattr(sources, "ROOT", tmp_path)
+    for package in ("solvers", "numpy", "plugin"):
+        write(f"{package}/__init__.py", "from numpy import array" if package == "numpy" else "")
+    ours = write("solvers/ours.py", "import numpy\nfrom numpy import array\nimport solvers.more")
+    theirs = write("plugin/theirs.py", "from numpy import array\nimport plugin.more")
+    more = write("solvers/more.py", ""), write("plugin/more.py", "")
+    assert closure(ours) == sorted([ours, more[0]])
+    assert closure(theirs) == sorted([theirs, more[1]])
 
 
 def test_a_digest_follows_the_contents_and_not_the_place(write):

@@ -58,7 +58,7 @@ def write_paper(folder: Path, methods: str | None, columns: str | None) -> list[
         for k, table in enumerate(paper_tables(runs, quantities), start=1)
     }
     figures = []
-    for chart in _charts(folder, runs):
+    for chart in charts(folder, runs):
         figures.append(Picture(Path(f"{chart.name}.pdf"), f"{chart.title}. {chart.caption}"))
         draw(chart, written / f"{chart.name}.pdf")
     texts["article.tex"] = "\n".join([HEAD, *_body(texts, figures), r"\end{document}", ""])
@@ -67,7 +67,7 @@ def write_paper(folder: Path, methods: str | None, columns: str | None) -> list[
     return [written / name for name in (*texts, *(figure.path.name for figure in figures))]
 
 
-def _charts(folder: Path, runs: pd.DataFrame) -> Iterator[Chart]:
+def charts(folder: Path, runs: pd.DataFrame) -> Iterator[Chart]:
     """All that there is to draw, energies of more than a second."""
     yield from work_precision(runs, Target.PAPER)
     yield from profiles(runs, newest_steps(folder, runs), Target.PAPER)

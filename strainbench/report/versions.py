@@ -16,7 +16,7 @@ from pathlib import Path
 from strainbench.bench.cell import content_of
 from strainbench.bench.machine import installed
 from strainbench.bench.records import Row, latest_runs, read_machines
-from strainbench.sources import ROOT, suite_digest
+from strainbench.sources import ROOT, SUITE, suite_digest
 
 PLUGINS = ("scenario", "solver")
 SAME = (
@@ -35,7 +35,7 @@ def shown_runs(folder: Path) -> list[Row]:
         If the records are damaged.
     """
     machines, now = read_machines(folder), cache(content_of)  # once for all rows that ask alike
-    changes = {name: _changed_packages(facts) for name, facts in machines.items()}
+    changes = {name: changed_packages(facts) for name, facts in machines.items()}
     kept: dict[tuple[str, ...], Row] = {}
     for row in latest_runs(folder).values():
         row = row | {"older": _older_source(row, now)}
@@ -88,13 +88,14 @@ def _older_source(row: Row, now: Callable[[str, tuple[str, ...]], str]) -> str:
     return ""
 
 
-def _changed_packages(facts: Mapping[str, object]) -> str:
-    """How a machine's packages differ from those installed."""
+def changed_packages(facts: Mapping[str, object]) -> str:
+    """How a machine's packages differ from those installed; ours is known by its sources."""
     packages = facts.get("packages")
     if not isinstance(packages, Mapping):
         return ""
     now = installed(packages)
-    changed = [f"{n} {packages[n]} (now {now[n]})" for n in packages if packages[n] != now[n]]
+    others = [name for name in packages if name != SUITE.name]
+    changed = [f"{n} {packages[n]} (now {now[n]})" for n in others if packages[n] != now[n]]
     return "with " + ", ".join(changed) if changed else ""
 
 

@@ -11,7 +11,8 @@ from strainbench.document.html import page
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.claims import cost, hernandez, projection, scheme, table1
-from strainbench.report.claims.claim import CLAIMS, PROGRAM, Claim, Finding, Verdict
+from strainbench.report.claims.claim import CLAIMS as CLAIMS
+from strainbench.report.claims.claim import PROGRAM, Claim, Finding, Verdict
 from strainbench.report.claims.evidence import Evidence
 
 PAPERS = {

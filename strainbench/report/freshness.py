@@ -1,0 +1,143 @@
+"""Which folders of results are older than the code that they measure, and how to have them anew.
+
+`python -m strainbench.report.freshness results` prints a line a folder. Rows know the sources that
+they were measured with. Studies record packages at most: of these the checkout's history tells
+how many edits of what they measure came after them.
+"""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from strainbench.bench.records import MACHINES, RUNS, RecordsError, read_machines
+from strainbench.document import Column, Table
+from strainbench.document.writers import markdown
+from strainbench.report.claims.written import CLAIMS
+from strainbench.report.versions import changed_packages, shown_runs
+from strainbench.sources import PACKAGES, TELLING
+
+FRESH = "nothing"
+NO_COMMAND = "none is known"
+OURS = r"(?:strainbench|make|python -m strainbench\S*|python -m pytest) [^`\n]*"
+LOCAL = "local"
+"""Folder of what is not committed."""
+
+
+def freshness(root: Path) -> Table:
+    """A line a folder of results below `root`.
+
+    Raises
+    ------
+    RecordsError
+        If there are none, or records are damaged.
+    """
+    known = commands(root / "README.md") | claimed()
+    lines = []
+    for folder in folders(root):
+        name = folder.relative_to(root).as_posix()
+        told = list(dict.fromkeys(own_commands(folder))) or known.get(name, [NO_COMMAND])
+        lines.append([name, _what(folder), "; ".join(age(folder)) or FRESH, "; ".join(told)])
+    if not lines:
+        raise RecordsError(f"{root} has no folder of results")
+    header: list[str | Column] = ["folder", "measured", "older than the code", "to be had anew"]
+    return Table("What results are older than", header, lines)
+
+
+def folders(root: Path) -> list[Path]:
+    """Those with tables of numbers, by name."""
+    holding = {path.parent for form in ("*.csv", "*.md") for path in root.rglob(form)}
+    return sorted(f for f in holding - {root} if f.relative_to(root).parts[0] != LOCAL)
+
+
+def _what(folder: Path) -> str:
+    return f"{len(shown_runs(folder))} cells" if (folder / RUNS).exists() else "a study"
+
+
+def age(folder: Path) -> list[str]:
+    """In what ways a folder is older than the code; nothing if in none."""
+    if (folder / RUNS).exists():
+        rows = shown_runs(folder)
+        counts = Counter(row["older"] for row in rows if row["older"])
+        return [f"{count} of {len(rows)} cells {how}" for how, count in counts.items()]
+    machines = read_machines(folder) if (folder / MACHINES).exists() else {}
+    changes = dict.fromkeys(filter(None, map(changed_packages, machines.values())))
+    return [*edits(folder), *changes]
+
+
+def edits(folder: Path) -> list[str]:
+    """How many edits of what a study measures are newer than its oldest numbers."""
+    numbers = sorted(folder.glob("*.csv")) or sorted(folder.glob("*.md"))
+    since = {
+        path: _git(folder, "log", "-1", "--format=%h %cs", "--", path.name) for path in numbers
+    }
+    if not all(since.values()):
+        return ["not known: its numbers stand in no history"]
+    rooms = [f":(top,exclude){PACKAGES[0]}/{room}" for room in TELLING if room != "studies"]
+    newer = {}
+    for path, told in since.items():
+        base = f"{told.split()[0]}..HEAD"
+        sources = (*(f":(top){name}" for name in PACKAGES), *rooms)
+        newer[path] = int(_git(folder, "rev-list", "--count", base, "--", *sources))
+    oldest = max(newer, key=lambda path: newer[path])
+    when = since[oldest].split()[1]
+    return [f"{newer[oldest]} edits since {oldest.name} of {when}"] if newer[oldest] else []
+
+
+def _git(folder: Path, *words: str) -> str:
+    """What git says in a folder; nothing where there is no git, or no checkout."""
+    try:
+        done = subprocess.run(
+            ["git", *words], cwd=folder, capture_output=True, text=True, check=False
+        )
+    except FileNotFoundError:
+        return ""
+    return done.stdout.strip() if done.returncode == 0 else ""
+
+
+def commands(readme: Path) -> dict[str, list[str]]:
+    """Of each folder that a table's first column links to or names, the commands beside it."""
+    found: dict[str, list[str]] = {}
+    if not readme.exists():
+        return found
+    for line in readme.read_text(encoding="utf-8").splitlines():
+        linked, _, beside = line.removeprefix("|").partition("|")
+        told = re.findall(rf"`({OURS})`", beside)
+        for name, target in re.findall(r"\[([^]]+)\]\(([^)]+)\)", linked) if told else ():
+            folder = name if target.startswith("#") else Path(target).parent.as_posix()
+            found.setdefault(folder, []).extend(told)
+    return found
+
+
+def claimed() -> dict[str, list[str]]:
+    """The commands of claims that write into a folder of results."""
+    found: dict[str, list[str]] = {}
+    for command in dict.fromkeys(c for claim in CLAIMS.values() for c in claim.commands):
+        if target := re.search(r"--results results/(claims/\S+)", command):
+            found.setdefault(target[1], []).append(command)
+    return found
+
+
+def own_commands(folder: Path) -> Iterator[str]:
+    """What a folder's tables say that they were made by."""
+    for path in sorted(folder.glob("*.md")):
+        text = path.read_text(encoding="utf-8")
+        if told := re.search(rf"^(?:Made by |`)({OURS})", text, re.MULTILINE):
+            yield told[1]
+
+
+def main(words: list[str]) -> None:
+    """Print the table as Markdown."""
+    try:
+        table = freshness(Path(words[0] if words else "results"))
+    except (RecordsError, OSError) as error:
+        raise SystemExit(f"strainbench.report.freshness: {error}") from None
+    print(markdown(table))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,109 @@
+"""What results are older than is told of each folder, with the command that measures it anew."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from strainbench.bench.machine import PACKAGES, describe_machine, installed
+from strainbench.bench.records import RUNS, RecordsError, remember_machine
+from strainbench.report.freshness import FRESH, NO_COMMAND, age, commands, freshness, main
+from tests.report.test_versions import measure
+
+RESULTS = Path(__file__).parents[2] / "results"
+README = """\
+| folder | command |
+|---|---|
+| [runs](runs/table1.md) | `make bench`, then `strainbench run swing --steps 2` |
+| [named](#below) | `strainbench duel ...`, of `solver` |
+"""
+
+
+def lines(root):
+    return {name: rest for name, *rest in freshness(root).lines}
+
+
+def git(folder, *words):
+    who = ["-c", "user.name=a", "-c", "user.email=a@b.c"]
+    subprocess.run(["git", *who, *words], cwd=folder, check=True, capture_output=True)
+
+
+@pytest.fixture
+def root(tmp_path):
+    (tmp_path / "README.md").write_text(README)
+    (tmp_path / "runs").mkdir()
+    remember_machine(tmp_path / "runs", "m", describe_machine(1)[1])
+    return tmp_path
+
+
+def test_rows_of_the_code_as_it_is_are_older_than_nothing(root):
+    measure(root / "runs", "none", seconds=1)
+    command = "make bench; strainbench run swing --steps 2"
+    assert lines(root) == {"runs": ["1 cells", FRESH, command]}
+
+
+def test_rows_of_another_version_are_counted(root):
+    measure(root / "runs", "none", seconds=1)
+    measure(root / "runs", "clarabel", seconds=1, suite="0123456789abcdef")
+    assert lines(root)["runs"][1] == "1 of 2 cells by another version of strainbench"
+
+
+def test_a_study_is_held_against_the_history_of_its_code(tmp_path):
+    study = tmp_path / "results/study"
+    for path in ("results/study/a.csv", "results/study/b.csv", "solvers/s.py"):
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text("a,b\n")
+    assert age(study) == ["not known: its numbers stand in no history"]
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", "-A")
+    git(tmp_path, "commit", "-qm", "measured")
+    assert age(study) == []
+    for room, edits in (("strainbench/cli", 0), ("strainbench/studies", 1), ("solvers", 2)):
+        (tmp_path / room).mkdir(parents=True, exist_ok=True)
+        (tmp_path / room / "new.py").touch()
+        git(tmp_path, "add", "-A")
+        git(tmp_path, "commit", "-qm", room)
+        assert [told.split(" edits since a.csv")[0] for told in age(study)] == [str(edits)][:edits]
+
+
+def test_packages_of_a_study_that_have_changed_are_named(tmp_path):
+    facts = describe_machine(1)[1] | {"packages": installed(PACKAGES) | {"numpy": "1.0"}}
+    (tmp_path / "a.csv").write_text("a\n1\n")
+    remember_machine(tmp_path, "m", facts)
+    assert age(tmp_path)[-1] == f"with numpy 1.0 (now {installed(['numpy'])['numpy']})"
+
+
+def test_a_study_says_what_made_it_and_a_folder_without_a_command_that_none_is_known(tmp_path):
+    for name, text in (("a", "# A\n\n`strainbench duel swing -o a.md`\n"), ("b", "# B\n")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x.md").write_text(text)
+    told = lines(tmp_path)
+    assert told["a"][2] == "strainbench duel swing -o a.md"
+    assert told["b"][2] == NO_COMMAND
+
+
+def test_commands_stand_beside_links_or_names(root):
+    assert commands(root / "README.md") == {
+        "runs": ["make bench", "strainbench run swing --steps 2"],
+        "named": ["strainbench duel ..."],
+    }
+
+
+def test_local_results_and_pictures_are_no_folders_of_results(root):
+    (root / "local").mkdir()
+    (root / "local/table1.md").touch()
+    with pytest.raises(SystemExit, match="has no folder of results"):
+        main([str(root)])
+
+
+def test_damage_is_one_line(root):
+    (root / "runs" / RUNS).write_text("damaged\n")
+    with pytest.raises(RecordsError, match=r"runs\.csv, line 1"):
+        freshness(root)
+
+
+def test_every_committed_folder_has_a_command_that_can_be_typed():
+    for name, (_, _, command) in lines(RESULTS).items():
+        assert command.startswith(("strainbench ", "make ", "python -m ")), name
