@@ -127,6 +127,27 @@ def stretched_cube(limits):
     return Problem(rest, np.array(corners), target, limits, pinned=np.array([0]))
 
 
+def random_volume(rng, limits=None):
+    """Some 10 to 40 irregular tetrahedra beyond limits, exact ones by default, and up to 3 pins."""
+    rest = 10 ** rng.uniform(-2, 0.5) * rng.uniform(0, 1, (int(rng.integers(8, 15)), 3))
+    elements = Delaunay(rest).simplices.astype(np.int64)
+    edges = rest[elements[:, 1:]] - rest[elements[:, :1]]
+    longest = np.linalg.norm(edges, axis=2).max(axis=1)
+    elements = elements[np.abs(np.linalg.det(edges)) > 0.05 * longest**3]
+    used, compact = np.unique(elements, return_inverse=True)
+    rest, elements = rest[used], compact.reshape(-1, 4)
+    if limits is None:
+        bounds = 1 + 10 ** rng.uniform(-3, -0.7) * rng.uniform(0.5, 2, (len(elements), 3))
+        limits = StretchLimits(np.eye(3), bounds, spectral=True)
+    placed = rest @ rotation(rng).T + rng.normal(size=3)
+    axes, strains = rotation(rng), rng.uniform(0.7, [1.8, 1.5, 1.5])
+    target = placed @ (axes * strains @ axes.T)
+    pinned = rng.permutation(len(rest))[: rng.integers(0, 4)]
+    target[pinned] = placed[pinned]
+    mass = 10 ** rng.uniform(-3, -1, len(rest)) if rng.random() < 0.5 else None
+    return Problem(rest, elements, target, limits, pinned, mass), placed
+
+
 def own_gap(problem, solution):
     """The referee's relative gap, from the solver's own multipliers instead of a reference's."""
     nowhere = np.full_like(problem.target, np.nan)

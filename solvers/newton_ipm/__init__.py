@@ -80,7 +80,6 @@ from strainbench import Clock, Problem, Solution, Solver, section
 from strainbench.arrays import FloatArray
 from strainbench.physics.linear import NotPositiveDefiniteError
 from strainbench.problem.dual import dual_bound
-from strainbench.problem.kinds import Exact
 
 PATIENCE = 25  # iterations after which a warm start is given up
 WIDTHS = 2e-8, 1e-10, 1e-12, 1e-13  # of wider limits; below, slacks are rounding
@@ -116,12 +115,6 @@ multipliers have no bound, and the referee's may price a violation higher than t
 
     warm: bool = False
     max_iterations: int = 200
-
-    def supports(self, problem: Problem) -> str | None:
-        """A reason, where limits are exact and elements are not triangles."""
-        if isinstance(problem.kind, Exact) and problem.elements.shape[1] != 3:
-            return "its exact limits are those of triangles"
-        return super().supports(problem)
 
     def prepare(self, problem: Problem) -> State | None:
         """Sparsity, ordering and symbolic factorisation; None where there is nothing to move."""

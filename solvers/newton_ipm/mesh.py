@@ -17,7 +17,7 @@ ROUNDING = 1e-14
 
 @dataclass(frozen=True)
 class Change:
-    """What a step changes: numbers (rows,) for sampled limits, matrices (e, 3) for exact ones.
+    """What a step changes: numbers (rows,) for sampled limits, matrices for exact ones.
 
     s, l : of slacks and multipliers
     square : dy dy^T / 2, by which slacks fall short of their linearisation
@@ -46,6 +46,21 @@ class Sums(NamedTuple):
     price: float
     beyond: float
     worst: float
+
+
+class Point(NamedTuple):
+    """Where all exact constraints are: y (e, m, 3), s, l and r~, and the scaling R, R^-1, d (e, m).
+
+    Symmetric matrices of triangles are their entries (e, 3), those of tetrahedra (e, 3, 3).
+    """
+
+    y: FloatArray
+    s: FloatArray
+    l: FloatArray  # noqa: E741
+    r: FloatArray
+    R: FloatArray
+    inverse: FloatArray
+    d: FloatArray
 
 
 @compiled

@@ -31,7 +31,7 @@ from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solution, Solver, run_solver
 
 REFERENCE_SOLVER = "newton-ipm"
-SLOW_SOLVER = "clarabel-tight"  # of exact limits in volumes, and where the other one fails
+SLOW_SOLVER = "clarabel-tight"  # where the other one fails
 LAST_SOLVERS = "clarabel", "clarabel-default"
 """Asked for less, and scaled less, these cope with limits far from the target; not scaled at all,
 with masses over 20 decades, whose mean says nothing of most."""

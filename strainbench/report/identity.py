@@ -89,6 +89,7 @@ def _arms(count: int, turn: float, width: float = 0.34) -> str:
 
 CIRCLE = "M-.95,0A.95,.95,0,1,1,.95,0A.95,.95,0,1,1,-.95,0Z"
 DOME = "M-1,.7A1,1.3,0,1,1,1,.7Z"
+RIGHT_TRIANGLE = _path([(1, -1), (1, 1), (-1, 1)])
 BAR = _path([(-1, -0.25), (1, -0.25), (1, 0.25), (-1, 0.25)])
 STAR = _regular(10, inner=0.42, radius=1.25)
 
@@ -118,6 +119,7 @@ LOOKS = {
         Look(Family.NLP, "ipopt", "#C04A00", _regular(3, radius=1.2)),
         Look(Family.NLP, "linearized-qp", "#7A4A12", _regular(3, 1 / 2, radius=1.2), (5, 2)),
         Look(Family.NLP, "ipopt-edges", "#E8923A", _regular(3, 1 / 4, radius=1.2), (2, 2)),
+        Look(Family.NLP, "ipopt-principal", "#D9793B", RIGHT_TRIANGLE, (1, 2)),
         Look(Family.NLP, "lcp-qp", "#5C3A1E", _path([(-1, -1), (1, 1), (-1, 1)]), (6, 2, 1, 2)),
         Look(Family.NLP, "sequential-cuts", "#9C2B16", _regular(3, 3 / 4, radius=1.2), (8, 2)),
         Look(Family.FIRST_ORDER, "admm", "#00786A", _arms(4, 0)),
@@ -128,6 +130,7 @@ LOOKS = {
         Look(Family.LOCAL, "fast-projection", "#E58AB4", DOME, (2, 2)),
         Look(Family.LOCAL, "gauss-seidel-strain", "#A9799A", _regular(5, 1 / 2), (6, 2, 1, 2)),
         Look(Family.LOCAL, "gauss-seidel-principal", "#D3AFC6", _regular(5, 1 / 4), (1, 2)),
+        Look(Family.LOCAL, "gauss-seidel-clamp", "#8A4F78", _regular(5, 1 / 8), (2, 2)),
         Look(Family.LOCAL, "lcp-pgs", "#7B2D5B", _regular(6, 1 / 12), (1, 2)),
         Look(Family.NONE, "none", "#6F6F6F", BAR, (1, 3)),
     )

@@ -57,10 +57,17 @@ def test_contact_with_anything_else_is_named():
 
 @pytest.mark.parametrize("name", [e.name for e in list_solvers() if not e.unavailable])
 def test_solvers_say_what_they_do_not_take(name):
-    limits = WIDE if name.startswith(("lcp", "none")) else StretchLimits(np.eye(3), np.ones(3))
+    limits = (
+        WIDE
+        if name.startswith(("lcp", "none", "ipopt-principal"))
+        else StretchLimits(np.eye(3), np.ones(3))
+    )
     solver, rough = find_solver(name), replace(FLOOR, friction=0.1)
     plain, rubbing = (solver.supports(pushed([0, 0, 0], p, limits)) for p in (FLOOR, rough))
-    if name.startswith(("lcp-pgs", "none")):
+    if name == "ipopt-principal":
+        assert plain is None
+        assert rubbing.startswith("it has no friction")
+    elif name.startswith(("lcp-pgs", "none")):
         assert plain is rubbing is None or "Biot" in plain
     elif name.startswith("lcp-qp"):
         assert plain is None or "Biot" in plain

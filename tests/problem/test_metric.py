@@ -87,7 +87,7 @@ def test_other_shapes_and_places_are_named():
         problem(linearise_at=np.full_like(REST, np.nan))
 
 
-TAKERS = ("none", "lcp-pgs", "lcp-qp")
+TAKERS = ("none", "lcp-pgs", "lcp-qp", "ipopt-principal", "gauss-seidel-clamp")
 
 
 @pytest.mark.parametrize("name", [e.name for e in list_solvers() if not e.unavailable])
