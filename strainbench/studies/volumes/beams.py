@@ -79,8 +79,8 @@ PART = Part(
     "The beams of Fig. 2",
     f"Each 1.2 s from rest, damped by masses at {ALPHA:g} / s, limits of 4%; stiff beams have "
     "none, and 4 MPa is what keeps their strain at 4%. The tip is the middle of the free end, at "
-    "rest at x = 1; its wobble how far it goes to and fro in the second half. Strain is the largest of "
-    "any principal stretch.",
+    "rest at x = 1; its wobble how far it goes to and fro in the second half. Strain is the "
+    "largest of any principal stretch.",
     [
         "material",
         *numbers(("E", "Pa", ".0f")),
