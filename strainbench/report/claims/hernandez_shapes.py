@@ -38,8 +38,8 @@ def jacobians(_: Evidence) -> Finding:
         Verdict.of(error < 1e-6 and sizes[-1] < 10 * sizes[0], error < 1e-6),
         f"Of {len(F)} random F, inverted ones among them, the derivatives of all {len(KINDS)} "
         f"kinds are central differences to {power(error)}. They are singular where singular "
-        f"values are equal or opposite, such as at F = I: at gaps of .1, .01, 1e-3, 1e-5 the largest has the "
-        f"size {told}.",
+        f"values are equal or opposite, such as at F = I: at gaps of .1, .01, 1e-3, 1e-5 "
+        f"the largest has the size {told}.",
         f"Values are kept {SEPARATION:g} apart here, also those of opposite sign: "
         "`pytest tests/problem/test_principal.py`.",
     )

@@ -58,7 +58,7 @@ def _read(file: Path) -> list[dict[str, object]]:
     if not file.exists():
         return []
     frame = pd.read_csv(file)
-    texts = frame.select_dtypes("object").columns
+    texts = [name for name in frame if not pd.api.types.is_numeric_dtype(frame[name])]
     return frame.fillna(dict.fromkeys(texts, "")).to_dict("records")  # type: ignore[return-value]
 
 
