@@ -80,8 +80,7 @@ def turned(_: Evidence) -> Finding:
     """What turns of the principal axes change, in the beam of Fig. 4 before the first violation."""
     scene = find_scenario("beam-compress")(kind="linear", step=0.02)  # type: ignore[call-arg]
     stage = Stage.opened(scene, find_solver("none"))
-    for _ in stage.steps(13):
-        pass
+    list(stage.steps(13))
     problem, x = stage.problem, stage.positions
     frames = rotation_svd(problem.deformation_gradients(x))
     upper = np.array([FREE["linear"][1]] * 2 + [1 + LIMIT])

@@ -10,6 +10,7 @@ from itertools import product
 import numpy as np
 
 from strainbench.arrays import FloatArray
+from strainbench.document import Column
 from strainbench.scenario.stage import Stage, StageError
 from strainbench.solver.registry import find_solver
 from strainbench.studies.volumes.part import Cell, Part, Plan, numbers, scene_of
@@ -74,7 +75,7 @@ def held(material: str, method: str, step_ms: float, limit: float = USUAL) -> It
     yield Held(material, method, step_ms, worst, median, unconverged, len(violations), ended)
 
 
-HEADER = [
+HEADER: list[str | Column] = [
     "material",
     "method",
     *numbers(("step", "ms", "g"), ("worst", "", ".2g"), ("median of the second half", "", ".2g")),

@@ -59,7 +59,8 @@ def _read(file: Path) -> list[dict[str, object]]:
         return []
     frame = pd.read_csv(file)
     texts = [name for name in frame if not pd.api.types.is_numeric_dtype(frame[name])]
-    return frame.fillna(dict.fromkeys(texts, "")).to_dict("records")  # type: ignore[return-value]
+    rows: list[dict[str, object]] = frame.fillna(dict.fromkeys(texts, "")).to_dict("records")
+    return rows
 
 
 def _is_of(row: dict[str, object], cell: Cell) -> bool:
