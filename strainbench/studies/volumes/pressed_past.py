@@ -45,8 +45,8 @@ PART = Part(
     past,
     "Limits pressed past what they allow",
     "The finger with limits by axis and without friction, driven to 2.5 mm. Where no step is "
-    "within the linearised limits, the interior point says so and ends; sweeps go on, unconverged, "
-    "and their force means nothing.",
+    "within the linearised limits, the interior point says so and ends; sweeps go on, "
+    "unconverged or beyond the limits themselves, and their force means nothing.",
     [
         *("press", "method"),
         *numbers(("depth", "mm", ".3g"), ("force", "N", ".3g"), ("violation", "", ".2g")),
