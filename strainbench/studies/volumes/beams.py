@@ -88,9 +88,9 @@ PART = Part(
     played,
     "The beams of Fig. 2",
     "Each 1.2 s from rest, damped by masses, limits of 4%; stiff beams have none, and 4 MPa is "
-    "what keeps their strain below 4%. The tip is the middle of the free end, at rest at "
-    "(1, .1); the wobble is how much the length of the centre line varies in the second half. Strain is the "
-    "largest of any principal stretch, at the end.",
+    "what keeps their strain below 4%. The tip is the middle of the free end, at rest at (1, .1); "
+    "the wobble is how much the length of the centre line varies in the second half. Strain is "
+    "the largest of any principal stretch, at the end.",
     [
         "material",
         *numbers(("E", "Pa", ".0f")),

@@ -72,7 +72,7 @@ def _with(solver: Solver, frame: Problem, resolution: int, free: float, before: 
     taken, details = thread_time() - begin, solution.details
     return Grown(
         resolution,
-        solver.label,
+        solver.name,
         tetrahedra=len(frame.elements),
         unknowns=3 * len(frame.free),
         rows=int(details.get("rows", 0)),
