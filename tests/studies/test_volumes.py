@@ -159,3 +159,8 @@ def test_growth_counts_what_a_mesh_takes(monkeypatch):
     assert limited.count > 1
     assert limited.ratio > alone.ratio
     assert 0 <= alone.megabytes <= limited.megabytes
+
+
+def test_a_method_that_cannot_take_the_limits_plays_no_step():
+    with pytest.raises(ValueError, match="newton-ipm: it has no form for limits on principal"):
+        next(cousin.beside("isotropic", "newton-ipm"))

@@ -18,6 +18,8 @@ from strainbench.problem.kinds import Limits
 from strainbench.problem.limits import StretchLimits
 from strainbench.problem.principal import PrincipalLimits
 from strainbench.problem.problem import Problem
+from strainbench.scenario.volume import VolumeScenario
+from strainbench.solver.registry import find_solver
 from strainbench.studies.volumes.march import Frame, in_metric, march, stretches
 from strainbench.studies.volumes.part import Cell, Part, Plan, numbers, scene_of
 
@@ -146,17 +148,26 @@ def beam_cells(_: Plan) -> Iterator[Cell]:
     """Principal limits by the linearised step, upper ones by two convex methods."""
     for name, limits in BEAMS.items():
         methods = ("lcp-qp",) if isinstance(limits, PrincipalLimits) else BESIDE
-        yield from ((name, method) for method in methods)
+        problem = _problem(limits)
+        yield from ((name, m) for m in methods if not find_solver(m).supports(problem))
+
+
+def _scene() -> VolumeScenario:
+    return scene_of("beam", limit=LIMIT, step=STEP, alpha=ALPHA)
+
+
+def _problem(limits: Limits) -> Problem:
+    """The beam's, in the norm of the masses of its step."""
+    body = _scene().solid()
+    mass = (1 + ALPHA * STEP) * body.mass
+    return Problem(body.rest, body.elements, body.rest, limits, body.pinned, mass)
 
 
 @cache
 def _played(name: str, method: str) -> tuple[FloatArray, float, list[float], list[int]]:
     """Positions at the end, worst violation, thread times [s] and iterations of all steps."""
-    scene = scene_of("beam", limit=LIMIT, step=STEP, alpha=ALPHA)
-    body, limits = scene.solid(), BEAMS[name]
-    problem = Problem(
-        body.rest, body.elements, body.rest, limits, body.pinned, (1 + ALPHA * STEP) * body.mass
-    )
+    body, limits = _scene().solid(), BEAMS[name]
+    problem = _problem(limits)
     masses: Frame = lambda target, start: problem.with_target(target)  # noqa: E731, ARG005
     frame = in_metric(body, problem, STEP) if isinstance(limits, PrincipalLimits) else masses
     x, v = body.rest.copy(), np.zeros_like(body.rest)

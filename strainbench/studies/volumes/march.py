@@ -38,9 +38,11 @@ def march(
 ) -> Iterator[Stepped]:
     """Steps of h [s] from positions x and velocities v, (n, 3), pins held.
 
-    They end after the first answer that is not finite.
+    They end after the first answer that is not finite. ValueError if the method cannot take them.
     """
     solver = find_solver(method)
+    if refusal := solver.supports(frame(x, x)):
+        raise ValueError(f"{method}: {refusal}")
     state = solver.prepare(frame(x, x))
     while np.all(np.isfinite(x)):
         problem = frame(linearised_step(body, x, v, h), x)
