@@ -99,7 +99,7 @@ def hyperbolic(seen: Evidence) -> Finding:
     return Finding(
         Verdict.of(all(abs(s - 1 - LIMIT) < 0.02 for s in stretches)),
         f"{_told(seen, 'hyperbolic')}.",
-        "With 1,600 tetrahedra: `python -m strainbench.studies.volumes --resolution 4 --part fig4`.",
+        "On 1,600 tetrahedra: `python -m strainbench.studies.volumes --resolution 4 --part fig4`.",
     )
 
 
