@@ -119,5 +119,5 @@ PART = Part(
         ),
         *numbers(("unconverged steps", "", ""), ("of", "", "")),
     ],
-    nothing="never",
+    nothing="none",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -92,7 +93,8 @@ def write(folder: Path, plan: Plan, parts: Sequence[str], command: str) -> None:
                 measured(part, plan, folder)
         name, facts = describe_machine(1)
         remember_machine(folder, name, facts)
-        told = document(folder, f"Measured on {name}.", command)
+        machines = json.loads((folder / "machines.json").read_text(encoding="utf-8"))
+        told = document(folder, f"Measured on {', '.join(machines)}.", command)
         write_whole(folder / "volumes.md", markdown(told).encode())
 
 
