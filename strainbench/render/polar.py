@@ -20,6 +20,7 @@ from strainbench.escape import chart
 from strainbench.problem.kinds import Limits, Sampled, kind_of
 from strainbench.problem.problem import Problem
 from strainbench.render.film import Film, Track, shoot, untracked
+from strainbench.render.planes import draw_planes
 from strainbench.report.identity import look
 
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -88,6 +89,8 @@ def polar(
 ) -> list[str]:
     """Play a scene with each solver and draw its last frame against the limits.
 
+    Of a volume they are drawn in the planes of its material axes (`strainbench.render.planes`).
+
     Raises
     ------
     ValueError
@@ -97,11 +100,10 @@ def polar(
         raise ValueError(f"-o {path}: a name that ends in {', '.join(SUFFIXES)} is valid")
     cells = plan_available(scenario, [solvers], settings, steps, tolerance)
     scene = cells[0].scenario.scenario()
-    if scene.problem().rest.shape[1] != 2:
-        raise ValueError(f"{scenario} is a volume: a scene of cloth is valid")
+    volume = scene.problem().rest.shape[-1] == 3
     open_folder(path.parent, "-o")
     films = [shoot(cell, every=steps, track=track) for cell in cells]
-    figure = draw_polar(films, scene.curve())
+    figure = draw_planes(films) if volume else draw_polar(films, scene.curve())
     stamp = {".png": None, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "strainbench"}):
         try:

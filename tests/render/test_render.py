@@ -12,13 +12,14 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
-from strainbench import Problem, StretchLimits
+from strainbench import PrincipalLimits, Problem, StretchLimits
 from strainbench.bench.plan import plan_one
 from strainbench.render import FORMATS, Camera, Film, Picture, render, write_film
 from strainbench.render.animation import durations
 from strainbench.render.export import surface
 from strainbench.render.film import State, measured, principal_stretches, shoot
 from strainbench.render.picture import DPI, SIZE, nice_above
+from strainbench.render.planes import directions, uniaxial
 from strainbench.render.polar import admissible, directional_stretches, draw_polar, polar
 from tests.cli.test_cli import strainbench
 from tests.problems import random_problem, rotation
@@ -380,3 +381,26 @@ def test_a_ball_hides_what_is_behind_it_and_cloth_in_front_hides_the_ball():
         ball, none = (Picture(f, camera).draw(0).astype(int) for f in (film, bare))
         changed = np.abs(ball - none).max(axis=2) > 40  # not but the seams between triangles
         assert np.any(changed) != hidden
+
+
+def test_a_volumes_limits_are_drawn_in_the_planes_of_its_axes(tmp_path):
+    path = tmp_path / "planes.svg"
+    assert polar("beam", "none", ["resolution=1"], 2, path)[-1] == f"wrote {path}"
+    text = path.read_text(encoding="utf-8")
+    assert all(f">{plane}<" in text for plane in ("xy", "xz", "yz"))
+    assert "limits on uniaxial strain" in text
+
+
+def test_uniaxial_limits_in_a_plane():
+    """Hyperbolic: d / |cos| to both sides, and nothing along the free axis; isotropic: d."""
+    limits = PrincipalLimits("hyperbolic", (None, 0.95, 0.95), (None, 1.05, 1.05))
+    u = directions((0, 1))
+    allowed, cosine = uniaxial(limits, u, 1.0), np.abs(u[:, 1])
+    seen = cosine > 0.01
+    assert allowed[seen] == pytest.approx(0.05 / cosine[seen], abs=1e-6)
+    assert np.all(np.isinf(allowed[cosine < 1e-12]))
+    steep = cosine > 0.1
+    assert uniaxial(limits, u, -1.0)[steep] == pytest.approx(-0.05 / cosine[steep], abs=1e-6)
+    same = PrincipalLimits("isotropic", 0.9, 1.1)
+    assert uniaxial(same, u, 1.0) == pytest.approx(0.1)
+    assert uniaxial(StretchLimits.exact(1.1, dim=3), u, 1.0) == pytest.approx(0.1)

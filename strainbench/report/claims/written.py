@@ -10,7 +10,14 @@ from strainbench.document import Code, Document, Prose, Strong, Table
 from strainbench.document.html import page
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
-from strainbench.report.claims import cost, hernandez, projection, scheme, table1
+from strainbench.report.claims import (
+    cost,
+    hernandez,
+    hernandez_shapes,
+    projection,
+    scheme,
+    table1,
+)
 from strainbench.report.claims.claim import CLAIMS as CLAIMS
 from strainbench.report.claims.claim import PROGRAM, Claim, Finding, Verdict
 from strainbench.report.claims.evidence import Evidence
@@ -19,7 +26,7 @@ PAPERS = {
     "T": "Tang, Coros and Thomaszewski 2022",
     "H": "Hernandez, Cirio, Perez and Otaduy 2013",
 }
-MODULES = (projection, scheme, table1, cost, hernandez)
+MODULES = (projection, scheme, table1, cost, hernandez, hernandez_shapes)
 """Their import registers the claims."""
 ABOUT = """\
 What the papers claim, in our words, beside what is measured here. Each verdict follows from the

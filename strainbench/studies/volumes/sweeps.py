@@ -6,36 +6,25 @@ more by both methods, with the same rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from time import thread_time
 
 import numpy as np
 import pandas as pd
 
-from strainbench.document import Column, Table
 from strainbench.problem.problem import Problem
-from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.stage import Stage
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import run_solver
+from strainbench.studies.volumes.part import Part, numbers, scene_of
 
 BOUNDS = (0, 5, 40, 160, 10**9)  # rows; the paper's words are of 5 and 40
 LABELS = ("1 to 5", "6 to 40", "41 to 160", "above")
 MATERIALS, STEPS = ("anisotropic", "isotropic"), (5e-3, 20e-3)  # [s]
 LASTS = 0.24  # [s]
 METHODS = ("lcp-pgs", "lcp-qp")
-ABOUT = (
-    "Each step of both beams, of 5 and 20 ms and without damping, as lcp-qp plays them, in "
-    "one round of lcp-pgs, up to 1000 sweeps to a residual of 1e-5, and of lcp-qp: medians, "
-    "and how many of the steps Gauss-Seidel solves. The ratio is that of thread times, Gauss-"
-    "Seidel's over the interior point's, in one process and one after the other."
-)
-COLUMNS = (
-    *(("steps", "", ""), ("sweeps", "", ".0f"), ("solved", "%", ".0f")),
-    *(("iterations of lcp-qp", "", ".0f"), ("ratio of times", "", ".2g")),
-)
 
 
 @dataclass(frozen=True)
@@ -67,7 +56,7 @@ def swept() -> Iterator[Sweeps]:
     """All rows of the table."""
     steps = []
     for material, step in product(MATERIALS, STEPS):
-        scene = find_scenario("beam")(material=material, step=step, alpha=0.0)  # type: ignore[call-arg]
+        scene = scene_of("beam", material=material, step=step, alpha=0.0)
         stage = Stage.opened(scene, find_solver("lcp-qp"))
         steps += [solved(stage.frame) for _ in stage.steps(round(LASTS / step))]
     table = pd.DataFrame(steps)
@@ -81,8 +70,19 @@ def swept() -> Iterator[Sweeps]:
             yield Sweeps(label, len(part), sweeps, share, iterations, float(ratio.median()))
 
 
-def table(rows: Sequence[Sweeps]) -> Table:
-    """Costs by rows."""
-    numbers = [Column(name, unit, form, right=True) for name, unit, form in COLUMNS]
-    body = [tuple(asdict(row).values()) for row in rows]
-    return Table("What a linearised step costs", ["rows", *numbers], body, about=ABOUT)
+PART = Part(
+    "sweeps",
+    0,
+    lambda _: [()],
+    swept,
+    "What a linearised step costs",
+    "Each step of both beams, of 5 and 20 ms and without damping, as lcp-qp plays them, in "
+    "one round of lcp-pgs, up to 1000 sweeps to a residual of 1e-5, and of lcp-qp: medians, "
+    "and how many of the steps Gauss-Seidel solves. The ratio is that of thread times, Gauss-"
+    "Seidel's over the interior point's, in one process and one after the other.",
+    [
+        "rows",
+        *numbers(("steps", "", ""), ("sweeps", "", ".0f"), ("solved", "%", ".0f")),
+        *numbers(("iterations of lcp-qp", "", ".0f"), ("ratio of times", "", ".2g")),
+    ],
+)
