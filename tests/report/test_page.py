@@ -177,10 +177,7 @@ def in_charts(page, expected):
     script = """(async () => (await specsOf('distance')))()"""
     for name, specs in page.run(script).items():
         points = [
-            p
-            for layer in specs["page"]["layer"]
-            for p in layer["data"]["values"]
-            if "quartiles" in p
+            p for rows in specs["page"]["datasets"].values() for p in rows if "quartiles" in p
         ]
         assert points
         for point in points:
@@ -253,7 +250,7 @@ def in_sweeps(page, runs):
         if not name.startswith("sweep-"):
             continue
         column = "distance_max" if "-distance" in name else "max_principal_stretch"
-        for point in (p for layer in chart["page"]["layer"] for p in layer["data"]["values"]):
+        for point in (p for rows in chart["page"]["datasets"].values() for p in rows):
             if "cell" in point and "-time" not in name:
                 run = runs[point["cell"]]
                 value, limit = float(run[column]), float(run["limit"])
