@@ -10,7 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from strainbench.bench.records import RecordsError
-from strainbench.document import Picture
+from strainbench.document import Picture, Prose, Table
 from strainbench.document.latex import latex
 from strainbench.report import load_runs
 from strainbench.report.charts import (
@@ -20,6 +20,7 @@ from strainbench.report.charts import (
     energy,
     growth,
     profiles,
+    scores,
     sweep,
     work_precision,
 )
@@ -27,6 +28,8 @@ from strainbench.report.paper import chosen_columns, chosen_methods, paper_table
 from strainbench.report.steps import newest_steps
 
 FOLDER = "paper"
+SHIFT = "shift "
+SCORED = "share of cases solved to the optimum, and shifted geometric means of the time"
 HELD = 12  # floats that LaTeX is given at a time
 HEAD = r"""% How the tables and figures of this folder stand in an article of two columns.
 \documentclass[twocolumn]{article}
@@ -55,7 +58,7 @@ def write_paper(folder: Path, methods: str | None, columns: str | None) -> list[
     written.mkdir(exist_ok=True)
     texts = {
         f"table-{k}.tex": latex([replace(table, label=f"strainbench-{k}")])
-        for k, table in enumerate(paper_tables(runs, quantities), start=1)
+        for k, table in enumerate([*paper_tables(runs, quantities), *_scored(folder, runs)], 1)
     }
     figures = []
     for chart in charts(folder, runs):
@@ -65,6 +68,21 @@ def write_paper(folder: Path, methods: str | None, columns: str | None) -> list[
     for name, text in texts.items():
         (written / name).write_text(text, encoding="utf-8")
     return [written / name for name in (*texts, *(figure.path.name for figure in figures))]
+
+
+def _scored(folder: Path, runs: pd.DataFrame) -> Iterator[Table]:
+    """What share each method solves and how fast, narrow enough for a column."""
+    for table in scores(runs, newest_steps(folder, runs)):
+        header = [
+            replace(c, name=c.name.removeprefix(SHIFT), above="ratio at a shift of")
+            if c.name.startswith(SHIFT)
+            else c
+            for c in table.columns
+        ]
+        notes = [Prose(table.about.replace("`", ""))]
+        yield replace(
+            table, title=f"{table.title}: {SCORED}.", header=header, about="", notes=notes
+        )
 
 
 def charts(folder: Path, runs: pd.DataFrame) -> Iterator[Chart]:

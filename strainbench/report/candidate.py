@@ -15,6 +15,7 @@ from strainbench.bench.load import OTHER_WORK
 from strainbench.fields import default_of, plain
 from strainbench.report.measures import (
     OUT_OF_TIME,
+    READ,
     SIGNS,
     VIOLATED,
     Quartiles,
@@ -129,7 +130,7 @@ class Records:
         for folder in dict.fromkeys(folders):
             rows = load_runs(folder)
             runs.append(rows.assign(folder=str(folder)))
-            found = numbers(newest_steps(folder, rows)).groupby("cell")
+            found = numbers(newest_steps(folder, rows)[[*READ, "ie_seconds"]]).groupby("cell")
             steps |= {(str(folder), str(cell)): part for cell, part in found}
         return cls(pd.concat(runs, ignore_index=True), steps)
 

@@ -117,7 +117,8 @@ def _together(drawn: Sequence[str], columns: int) -> str:
             left += float(sizes[k]["width"])
         across, top = max(across, left), top + max(float(sizes[k]["height"]) for k in row)
     size = f'width="{across:g}" height="{top:g}" viewBox="0 0 {across:g} {top:g}"'
-    return f"<svg {SVG} {size}>{''.join(parts)}</svg>"
+    behind = f'<rect width="{across:g}" height="{top:g}" fill="white"/>'  # where rows end unevenly
+    return f"<svg {SVG} {size}>{behind}{''.join(parts)}</svg>"
 
 
 if __name__ == "__main__":

@@ -42,7 +42,7 @@ def with_drift(runs: pd.DataFrame, steps: pd.DataFrame) -> pd.DataFrame:
 
 def _heights(steps: pd.DataFrame, cells: list[str]) -> dict[str, pd.Series]:
     """The energy of gravity after each step of these cells."""
-    parsed = numbers(steps[steps["cell"].isin(cells)])
+    parsed = numbers(steps.loc[steps["cell"].isin(cells), ["cell", "step", "gravity_energy"]])
     known = parsed.dropna(subset=["gravity_energy"])
     return {
         str(cell): rows.groupby("step")["gravity_energy"].last()

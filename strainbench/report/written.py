@@ -13,7 +13,6 @@ from strainbench.document.writers import csv, markdown
 from strainbench.progress import Track, untracked
 from strainbench.report.charts import Makers, chart_sheets
 from strainbench.report.drawing import drawn_beside
-from strainbench.report.energy import energy_table
 from strainbench.report.failures import failures, failures_document
 from strainbench.report.local import local_table
 from strainbench.report.page import report_page
@@ -22,7 +21,7 @@ from strainbench.report.paper import as_latex, chosen_methods
 from strainbench.report.printed import printed_tables
 from strainbench.report.runs import load_runs
 from strainbench.report.steps import newest_steps
-from strainbench.report.sweep import BEYOND, sweep_tables
+from strainbench.report.sweep import BEYOND
 from strainbench.report.table import as_markdown, tidy
 
 
@@ -51,13 +50,13 @@ def _texts(
     }
     if (printed := printed_tables(runs)).parts:
         texts["table1-paper.md"] = markdown(printed)
-    if swept := sweep_tables(runs):
+    if swept := make.swept():
         texts["sweeps.md"] = markdown(Document("Sweeps", [Prose(BEYOND), *swept]))
     failed = failures(folder, runs)
     if len(failed):
         texts["failures.csv"] = csv(Table.of(failed))
         texts["failures.md"] = markdown(failures_document(failed, runs, machines))
-    if (energy := energy_table(folder, runs)).lines:
+    if (energy := make.energies()).lines:
         texts["energy.md"] = markdown(energy)
     if (local := local_table(folder, runs)).lines:
         texts["local.md"] = markdown(local)

@@ -8,6 +8,7 @@ import random
 import re
 import shutil
 import statistics
+from itertools import chain
 from math import floor, log10
 
 import numpy as np
@@ -177,10 +178,7 @@ def in_charts(page, expected):
     script = """(async () => (await specsOf('distance')))()"""
     for name, specs in page.run(script).items():
         points = [
-            p
-            for layer in specs["page"]["layer"]
-            for p in layer["data"]["values"]
-            if "quartiles" in p
+            p for rows in specs["page"]["datasets"].values() for p in rows if "quartiles" in p
         ]
         assert points
         for point in points:
@@ -209,31 +207,113 @@ def in_steps(page, field):
 
 
 def in_scores(page, field):
-    """The same of the per cent that the scores say are solved."""
+    """The same of the scores: per cent solved, shifted geometric means, paired ratios."""
     runs = {run["cell"]: run for run in read(field, "runs.csv")}
-    solver = {cell: run["solver"] for cell, run in runs.items()}
     had = [s for s in read(field, "steps.csv") if float(s["active_constraints"] or 0) > 0]
-    number = len({(runs[s["cell"]]["resolution"], s["step"]) for s in had})
-    for method, share in each(
-        page, "#profile tbody tr", "[e.cells[0].textContent, e.cells[1].textContent]"
-    ):
-        solved = [s for s in had if solver[s["cell"]] == method and s["outcome"] == "optimal"]
-        yield ("score", method), float(share), 100 * len(solved) / number, 0.1
+    places = sorted({(runs[s["cell"]]["resolution"], s["step"]) for s in had})
+    limits = {run["resolution"]: float(run["time_limit"]) for run in runs.values()}
+    lines = each(page, "#profile tbody tr", "[...e.cells].map((c) => c.textContent.trim())")
+    times = {method: {} for method, *_ in lines}
+    for s in had:
+        run = runs[s["cell"]]
+        if s["outcome"] == "optimal" and run["solver"] in times:
+            times[run["solver"]][run["resolution"], s["step"]] = float(s["seconds"])
+    shift = statistics.median(min(of[p] for of in times.values() if p in of) for p in places)
+
+    def mean(method, scale):
+        charged = np.array([times[method].get(p, limits[p[0]]) for p in places])
+        return np.exp(np.log(charged + scale * shift).mean()) - scale * shift
+
+    best = lines[0][0]
+    for method, share, *ratios, paired, pairs in lines:
+        own, other = times[method], times[best]
+        yield ("score", method), float(share), 100 * len(own) / len(places), 0.1
+        if own:
+            for scale, ratio in zip((0.1, 1.0, 10.0), ratios, strict=True):
+                least = min(mean(each_, scale) for each_ in times)
+                yield (
+                    ("shift", scale, method),
+                    float(ratio),
+                    mean(method, scale) / least,
+                    TWO_DIGITS,
+                )
+            both = [own[p] / other[p] for p in own if p in other]
+            yield ("paired", method), float(paired), np.exp(np.log(both).mean()), TWO_DIGITS
+            yield ("pairs", method), float(pairs), len(both), 0
 
 
 @pytest.fixture(scope="module")
 def failing(browser, tmp_path_factory):
-    """The report of committed results: hard cases, energies, sweeps."""
+    """The report of committed results: hard cases, energies, sweeps; some made warm."""
     folder = tmp_path_factory.mktemp("failing") / "failing"
     folder.mkdir()
     for source in (HERE / "results" / name for name in ("failures", "sweeps", "swing-short")):
         append_rows(folder / RUNS, RUN_COLUMNS, latest_runs(source).values())
         append_rows(folder / STEPS, STEP_COLUMNS, latest_steps(source))
+    twins, steps = warm_twins(HERE / "results/swing-short")
+    append_rows(folder / RUNS, RUN_COLUMNS, twins)
+    append_rows(folder / STEPS, STEP_COLUMNS, steps)
     write_report(folder)
     shown = browser.open(folder / "index.html", hash_="#scene=*")
     shown.until("document.body.dataset.drawn !== undefined")
     yield folder, shown
     shown.close()
+
+
+def warm_twins(source):
+    """Cells of three methods as if they had started warm: sooner, nearer, in fewer iterations."""
+    runs = [r for r in latest_runs(source).values() if r["solver"] in WARMED]
+    twins = [
+        run
+        | {"cell": f"{run['cell']}-w", "solver": f"{run['solver']}-warm"}
+        | {"solver_parameters": json.dumps({"warm": True})}
+        | {k: float(run[k]) / 1.7 for k in ("iterations_mean", "distance_max")}
+        for run in runs
+    ]
+    cells = {run["cell"]: k for k, run in enumerate(runs, start=2)}
+    steps = [
+        step
+        | {"cell": f"{step['cell']}-w", "seconds": float(step["seconds"]) / cells[step["cell"]]}
+        for step in latest_steps(source)
+        if step["cell"] in cells
+    ]
+    return twins, steps
+
+
+WARMED = ("newton-ipm", "clarabel", "gauss-seidel")
+
+
+def in_warm(page, runs, steps):
+    """The same of cold and warm starts beside each other."""
+    table = "[...e.querySelectorAll('th')].some((h) => h.textContent.startsWith('cold over warm'))"
+    rows = "[...e.tBodies[0].rows].map((r) => [...r.cells].map((c) => c.textContent))"
+    lines = f"{table} ? {rows} : []"
+    for scene, bound, method, ratio, *others in chain(*each(page, "#table table", lines)):
+        limit, size = float(bound.rstrip("%")) / 100, re.search(r"(\d+)×", scene)[1]
+        pair = [
+            run
+            for name in (method, f"{method}-warm")
+            for run in runs.values()
+            if run["solver"] == name and (run["scenario"], run["resolution"]) == ("swing", size)
+            if float(run["limit"]) == limit
+            and run["mode"] == "simulate"
+            and run["steps_asked"] == "10"
+            if f"{run['cell'].removesuffix('-w')}-w" in runs
+        ]
+        medians = [
+            statistics.median(
+                float(s["seconds"])
+                for s in steps[run["cell"]]
+                if float(s["active_constraints"]) > 0
+            )
+            for run in pair
+        ]
+        where = (scene, bound, method)
+        yield where, float(ratio), medians[0] / medians[1], 5e-3
+        for run, iterations, distance in zip(pair, others[:2], others[2:], strict=True):
+            yield where, float(iterations), float(run["iterations_mean"]), 1e-3
+            column = "reference_error_max" if distance.startswith("<") else "distance_max"
+            yield where, float(distance.lstrip("<")), 1000 * float(run[column]), TWO_DIGITS
 
 
 def in_matrix(page, runs):
@@ -253,7 +333,7 @@ def in_sweeps(page, runs):
         if not name.startswith("sweep-"):
             continue
         column = "distance_max" if "-distance" in name else "max_principal_stretch"
-        for point in (p for layer in chart["page"]["layer"] for p in layer["data"]["values"]):
+        for point in (p for rows in chart["page"]["datasets"].values() for p in rows):
             if "cell" in point and "-time" not in name:
                 run = runs[point["cell"]]
                 value, limit = float(run[column]), float(run["limit"])
@@ -283,13 +363,14 @@ PARTS = ("kinetic", "gravity", "membrane", "bending", "contact")
 
 
 @pytest.mark.slow
-def test_numbers_of_hard_cases_sweeps_and_energies_trace_to_rows(failing):
+def test_numbers_of_hard_cases_sweeps_energies_and_warm_starts_trace_to_rows(failing):
     folder, page = failing
     runs = {run["cell"]: run for run in read(folder, "runs.csv")}
     steps, chosen = {}, random.Random(0)
     for step in read(folder, "steps.csv"):
         steps.setdefault(step["cell"], []).append(step)
-    for found in (in_matrix(page, runs), in_sweeps(page, runs), in_energies(folder, steps)):
+    kinds = (in_matrix(page, runs), in_sweeps(page, runs), in_energies(folder, steps))
+    for found in (*kinds, in_warm(page, runs, steps)):
         every = list(found)
         assert every
         for where, shown, right, share in chosen.sample(every, min(50, len(every))):

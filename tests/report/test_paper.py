@@ -162,8 +162,12 @@ def test_three_tables_and_three_figures_stand_in_two_columns(tmp_path):
     append_rows(tmp_path / RUNS, RUN_COLUMNS, rows)
     written = [path.name for path in write_paper(tmp_path, None, "seconds,violation,gap,mm")]
     assert [name for name in written if name.endswith(".tex")] == [
-        *("table-1.tex", "table-2.tex", "table-3.tex", "article.tex")
+        *(f"table-{k}.tex" for k in (1, 2, 3, 4)),
+        "article.tex",
     ]
+    scored = lines_of((tmp_path / "paper/table-4.tex").read_text(encoding="utf-8"))
+    assert re.fullmatch(r"good & 100 & 1\.0 & 1\.0 & 1\.0 & 1\.0 & 1 .*", scored["good"])
+    assert re.fullmatch(r"better & 100 & 2\.0 & 2\.0 & 2\.0 & 2\.0 & 1 .*", scored["better"])
     assert sum(name.startswith("speed-accuracy") for name in written) == 3
     log = compiled(tmp_path / "paper")
     assert "Overfull" not in log

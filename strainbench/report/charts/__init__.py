@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from strainbench.document import Table
 from strainbench.report.charts.chart import Chart, draw, draw_sheet, sheet
 from strainbench.report.charts.convergence import convergence
 from strainbench.report.charts.energy import energy
@@ -19,6 +20,8 @@ from strainbench.report.charts.sweep import sweep
 from strainbench.report.charts.target import Target
 from strainbench.report.charts.work import work_precision
 from strainbench.report.drawing import Sheet
+from strainbench.report.energy import energy_table
+from strainbench.report.sweep import sweep_tables
 
 __all__ = [
     "Chart",
@@ -41,14 +44,16 @@ MOST = 8  # charts of a kind in files: each takes a third of a second
 
 @dataclass(frozen=True)
 class Makers:
-    """What makes the charts of a results folder, each kind once for a target: files and page
-    share them."""
+    """What makes the charts of a results folder, each kind once for a target, and the tables of
+    which there are many lines: files and page share them."""
 
     speed: Callable[[Target, str], list[Chart]]
     profile: Callable[[Target], list[Chart]]
     growth: Callable[[Target], list[Chart]]
     sweep: Callable[[Target], dict[str, list[Chart]]]
     energy: Callable[[Target, float], list[Chart]]
+    swept: Callable[[], list[Table]]
+    energies: Callable[[], Table]
 
     @classmethod
     def of(cls, folder: Path, runs: pd.DataFrame, steps: pd.DataFrame) -> Makers:
@@ -60,6 +65,8 @@ class Makers:
             cache(partial(growth, runs)),
             cache(partial(sweep, runs)),
             cache(partial(energy, folder, runs)),
+            cache(partial(sweep_tables, runs)),
+            cache(partial(energy_table, folder, runs)),
         )
 
 

@@ -74,6 +74,10 @@ class Plane:
         """Where values stand."""
         return self.x.at(x) * self.width, (1 - self.y.at(y)) * self.height
 
+    def holds(self, x: float, y: float) -> bool:
+        """Whether values are on both axes."""
+        return self.x.low <= x <= self.x.high and self.y.low <= y <= self.y.high
+
     def channels(self, x: str, y: str) -> Spec:
         """Of two fields on these axes."""
         size = self.target.sizes.title
@@ -83,7 +87,8 @@ class Plane:
 
     def add(self, mark: Spec, rows: Iterable[Mapping[str, object]], encoding: Spec) -> None:
         """A layer; nothing without rows."""
-        if values := list(rows):
+        values = rows if isinstance(rows, list) else list(rows)  # layers may share one
+        if values:
             self.layers.append({"data": {"values": values}, "mark": mark, "encoding": encoding})
 
     def dimmed(self) -> Spec:

@@ -107,7 +107,9 @@ class Curves:
     def _lines(self, plane: Plane) -> None:
         sizes, rows = plane.target.sizes, [row for curve in self.curves for row in curve.rows]
         encoding = {**plane.channels("x", "y"), "stroke": raw("colour"), **plane.dimmed()}
-        line: Spec = {"type": "line", "strokeWidth": sizes.line, "clip": True}
+        line: Spec = {"type": "line", "strokeWidth": sizes.line}
+        if not all(plane.holds(row["x"], row["y"]) for row in rows):
+            line["clip"] = True  # of each line by itself, which is slow to draw
         if self.steps:
             line["interpolate"] = "step-after"
         order = {"order": {"field": "order", "type": "quantitative"}}
@@ -122,7 +124,7 @@ class Curves:
     def _behind(self, plane: Plane) -> None:
         """The band and the levels, with their names where these cover nothing."""
         size, low, high = plane.target.sizes.text, self.y.low, self.y.high
-        taken = list(self._covered(plane))
+        taken = list(self._covered(plane)) if self.band or self.levels else []
         if self.band and self.band > low:
             top = max(plane.pixel(self.x.low, min(self.band, high))[1], 0)
             plane.box_layer(Box(0, top, plane.width, plane.height), BAND)

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.typing import SeriesGroupBy
 
+from strainbench.arrays import FloatArray
 from strainbench.report.charts.axes import Axis, even_ticks
 from strainbench.report.charts.canvas import Spec, about
 from strainbench.report.charts.chart import Chart
@@ -52,7 +53,9 @@ def _chart(name: str, panel: str, rows: pd.DataFrame, target: Target) -> Chart:
     for found, line in _looks(rows):
         label = names[line["curve"].iloc[0]]
         beyond = line[line["energy"] > high]
-        curves.append(Curve(found | {"line": label}, "" if len(beyond) else label, _points(line)))
+        curves.append(
+            Curve(found | {"line": label}, "" if len(beyond) else label, _points(line, (low, high)))
+        )
         if len(beyond):
             text = f"{label}: blows up at {beyond['time'].iloc[0]:.2g} s"
             failures.append(found | {"text": text})
@@ -90,11 +93,24 @@ def _span(energies_: SeriesGroupBy) -> tuple[float, float]:
     return low - EDGE * (high - low) - 1e-9, high + EDGE * (high - low) + 1e-9
 
 
-def _points(line: pd.DataFrame) -> list[Spec]:
-    """At most MOST of a run's, evenly."""
+def _points(line: pd.DataFrame, span: tuple[float, float]) -> list[Spec | None]:
+    """At most MOST of a run's, evenly; a gap where it is out of the span."""
     kept = np.unique(np.linspace(0, len(line) - 1, min(len(line), MOST)).round().astype(int))
-    chosen = line.iloc[kept]
-    return [point(t, e) for t, e in zip(chosen["time"], chosen["energy"], strict=True)]
+    times, values = (line[name].to_numpy(float)[kept] for name in ("time", "energy"))
+    ends = [end for k in range(len(times) - 1) for end in _crossings(times, values, k, span)]
+    found = sorted([*zip(times, values, strict=True), *ends])
+    points = [point(t, e) if span[0] <= e <= span[1] else None for t, e in found]
+    return points if any(points) else [point(times[-1], float(np.clip(values[-1], *span)))]
+
+
+def _crossings(
+    times: FloatArray, values: FloatArray, k: int, span: tuple[float, float]
+) -> Iterator[tuple[float, float]]:
+    """Where a run leaves or enters the span between one point and the next."""
+    here, there = values[k : k + 2]
+    for edge in span:
+        if (here - edge) * (there - edge) < 0:
+            yield times[k] + (times[k + 1] - times[k]) * (edge - here) / (there - here), edge
 
 
 def _looks(rows: pd.DataFrame) -> Iterator[tuple[Spec, pd.DataFrame]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from strainbench.report.charts.target import Target
 from strainbench.report.measures import COUNT, OPTIMAL, duration
 from strainbench.report.names import cells as cells_of
 from strainbench.report.names import percent
-from strainbench.report.rows import rows_of
+from strainbench.report.rows import Row, rows_of
 from strainbench.report.sweep import beyond, differs, sweeps
 
 SPAN = 8.0  # between the least and the largest value, from which on an axis is logarithmic
@@ -90,10 +90,11 @@ def _size(line: pd.DataFrame) -> list[str]:
 def _chart(
     name: str, title: str, key: str, line: pd.DataFrame, measure: Measure, target: Target
 ) -> Chart:
-    curves = []
-    for solver, cells in line.groupby("solver", sort=False):
-        if cells["y"].notna().any():
-            curves.append(Curve(about(str(solver)), str(solver), _points(cells)))
+    curves = [
+        Curve(about(solver), solver, points)
+        for solver, cells in _by_solver(rows_of(line)).items()
+        if any(points := _points(cells))
+    ]
     most = int(target.sizes.height / 2.2 / target.sizes.text)
     y = decades(measure.title, line["y"].dropna(), measure.tick, most)
     title = f"{title}: {measure.title} against {key}"
@@ -109,7 +110,15 @@ def _chart(
     return Chart(name, title, CAPTION.replace("\n", " "), drawn.spec(target))
 
 
-def _points(cells: pd.DataFrame) -> list[Spec | None]:
+def _by_solver(runs: Iterable[Row]) -> dict[str, list[Row]]:
+    """In the order in which they come."""
+    found: dict[str, list[Row]] = {}
+    for run in runs:
+        found.setdefault(str(run["solver"]), []).append(run)
+    return found
+
+
+def _points(cells: Iterable[Row]) -> list[Spec | None]:
     """A gap where nothing counts."""
     return [
         None
@@ -123,7 +132,7 @@ def _points(cells: pd.DataFrame) -> list[Spec | None]:
             outcome=run["ending"],
             said=duration(run["time"]),
         )
-        for run in rows_of(cells)
+        for run in cells
     ]
 
 
@@ -148,10 +157,9 @@ def _shown(key: str, value: float, shown: str) -> str:
 def _failures(key: str, line: pd.DataFrame) -> list[dict[str, Any]]:
     failed = line[~line["ending"].isin(COUNT)]
     entries = []
-    for solver, cells in failed.groupby("solver", sort=False):
+    for solver, cells in _by_solver(rows_of(failed)).items():
         whys = [
-            f"at {_shown(key, run['value'], str(run['shown']))}: {why_failed(run)}"
-            for run in rows_of(cells)
+            f"at {_shown(key, run['value'], str(run['shown']))}: {why_failed(run)}" for run in cells
         ]
-        entries.append(about(str(solver)) | {"text": f"{solver} {', '.join(whys)}"})
+        entries.append(about(solver) | {"text": f"{solver} {', '.join(whys)}"})
     return entries

@@ -148,8 +148,10 @@ def place(
         places = _places(name, size, mark)
         costs = _costs(places, name, boxes, _edges([plane]))
         few = np.argsort(costs, kind="stable")[:FEW]
-        crossed = CROSSED * _crossed(places[few], name, boxes, mark)
-        best = places[few[np.argmin(costs[few] + crossed)]]
+        best = places[few[0]]
+        if _crossed(best[None], name, boxes, mark).any():
+            crossed = CROSSED * _crossed(places[few], name, boxes, mark)
+            best = places[few[np.argmin(costs[few] + crossed)]]
         end = _nearest(best[None], name)
         led = float(np.hypot(*(end[0] - (name.x, name.y)))) > 2.2 * mark + 2
         placed.append(Placed(name, Box(*map(float, best)), led))

@@ -76,8 +76,21 @@ def _drawn(draw: Draw, cases: Mapping[str, Case], against: str) -> Iterator[Draw
         alone = {
             KEYS[name]: v[0] for name, v in zip(CASE, values, strict=False) if len(set(v)) == 1
         }
-        specs = {name: chart.spec for name, chart in zip(TARGETS, [page, *more], strict=True)}
+        specs = {
+            name: _sharing(chart.spec) for name, chart in zip(TARGETS, [page, *more], strict=True)
+        }
         yield Drawn(page.name, page.caption, alone | about, specs)
+
+
+def _sharing(spec: Mapping[str, Any]) -> dict[str, Any]:
+    """The same with rows that several layers have written once."""
+    every = [layer["data"]["values"] for layer in spec["layer"]]
+    names = {id(rows): str(k) for k, rows in enumerate(every)}
+    layers = [
+        layer | {"data": {"name": names[id(rows)]}}
+        for layer, rows in zip(spec["layer"], every, strict=True)
+    ]
+    return {**spec, "layer": layers, "datasets": {names[id(rows)]: rows for rows in every}}
 
 
 def _cells(spec: Mapping[str, Any]) -> set[str]:

@@ -17,13 +17,12 @@ from strainbench.document.html import html
 from strainbench.progress import Track
 from strainbench.report import warm
 from strainbench.report.charts import Makers, scores
-from strainbench.report.energy import energy_table
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.local import local_table
 from strainbench.report.machine import machine_section
 from strainbench.report.page.claimed import claims_table
 from strainbench.report.page.drawn import Drawn, drawings_of
-from strainbench.report.sweep import BEYOND, sweep_tables
+from strainbench.report.sweep import BEYOND
 from strainbench.report.table import LOCAL, OLDER, details, ledger_table, older, reasons
 
 OURS = {"table1.md", "sweeps.md", "failures.md", "energy.md", "local.md", "claims.md"}
@@ -102,13 +101,13 @@ def sections(
     drawings = drawings_of(folder, runs, make, track)
     hard = [name for name, there in (("matrix", len(failed)), ("maps", mapped)) if there]
     boxes: dict[str, Sequence[str]] = {"table": ("table1", "cells"), "failures": hard}
-    swept = _swept(runs)
+    swept = _swept(make.swept())
     bodies = {
         "speed": Markup(),
         "table": _note(runs) + html(warm.table(runs), 3),
         "profile": Markup().join(html(table, 3) for table in scores(runs, steps)),
         "failures": _signs(failed, runs) + swept,
-        "convergence": _folded("Energies in numbers", [energy_table(folder, runs)]),
+        "convergence": _folded("Energies in numbers", [make.energies()]),
         "claims": html(claims_table(folder), 3),
         "pictures": _pictures(folder),
         "protocol": _protocol(folder, runs, machines),
@@ -137,9 +136,8 @@ def _signs(failed: pd.DataFrame, runs: pd.DataFrame) -> Markup:
     return html(Prose(said.replace("\n\n", " ")))
 
 
-def _swept(runs: pd.DataFrame) -> Markup:
+def _swept(tables: Sequence[Table]) -> Markup:
     """The sweeps in numbers; a link to their file where they are too many to stand in the page."""
-    tables = sweep_tables(runs)
     if sum(len(table.lines) for table in tables) > MOST:
         return Markup('<p>Sweeps in numbers: <a href="{0}">{0}</a></p>').format("sweeps.md")
     return _folded("Sweeps in numbers", tables, Prose(BEYOND))

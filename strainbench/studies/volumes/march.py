@@ -55,6 +55,6 @@ def march(
 def stretches(problem: Problem, x: FloatArray) -> FloatArray:
     """(e, 3) principal stretches of tetrahedra, the last one negative where inverted."""
     F = problem.deformation_gradients(x)
-    s: FloatArray = np.linalg.svd(F, compute_uv=False)
+    s: FloatArray = np.array(np.linalg.svd(F, compute_uv=False), float)
     s[:, 2] *= np.where(np.linalg.det(F) < 0, -1.0, 1.0)
     return s
