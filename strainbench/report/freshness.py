@@ -1,6 +1,6 @@
 """Which folders of results are older than the code that they measure, and how to have them anew.
 
-`python -m strainbench.report.freshness results` prints a line a folder. Rows know the sources that
+`python -m strainbench.report.freshness results` prints them. Rows know the sources that
 they were measured with. Studies record packages at most: of these the checkout's history tells
 how many edits of what they measure came after them.
 """
@@ -13,23 +13,35 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from strainbench.bench.records import MACHINES, RUNS, RecordsError, read_machines
-from strainbench.document import Column, Table
-from strainbench.document.writers import markdown
 from strainbench.report.claims.written import CLAIMS
 from strainbench.report.versions import changed_packages, shown_runs
 from strainbench.sources import PACKAGES, TELLING
 
-FRESH = "nothing"
+FRESH = "as the code is now"
 NO_COMMAND = "none is known"
 OURS = r"(?:strainbench|make|python -m strainbench\S*|python -m pytest) [^`\n]*"
 LOCAL = "local"
 """Folder of what is not committed."""
 
 
-def freshness(root: Path) -> Table:
-    """A line a folder of results below `root`.
+class Standing(NamedTuple):
+    """A folder of results: what it holds, in what it is older than the code, what measures it."""
+
+    folder: str
+    measured: str
+    older: list[str]
+    commands: list[str]
+
+    def __str__(self) -> str:
+        told = f"{self.folder} ({self.measured}): {'; '.join(self.older) or FRESH}"
+        return "\n".join([told, *(f"    {command}" for command in self.commands)])
+
+
+def freshness(root: Path) -> list[Standing]:
+    """Of each folder of results below `root`.
 
     Raises
     ------
@@ -37,15 +49,14 @@ def freshness(root: Path) -> Table:
         If there are none, or records are damaged.
     """
     known = commands(root / "README.md") | claimed()
-    lines = []
+    found = []
     for folder in folders(root):
         name = folder.relative_to(root).as_posix()
         told = list(dict.fromkeys(own_commands(folder))) or known.get(name, [NO_COMMAND])
-        lines.append([name, _what(folder), "; ".join(age(folder)) or FRESH, "; ".join(told)])
-    if not lines:
+        found.append(Standing(name, _what(folder), age(folder), told))
+    if not found:
         raise RecordsError(f"{root} has no folder of results")
-    header: list[str | Column] = ["folder", "measured", "older than the code", "to be had anew"]
-    return Table("What results are older than", header, lines)
+    return found
 
 
 def folders(root: Path) -> list[Path]:
@@ -131,12 +142,13 @@ def own_commands(folder: Path) -> Iterator[str]:
 
 
 def main(words: list[str]) -> None:
-    """Print the table as Markdown."""
+    """Print each folder, with commands that can be copied, and how many are older."""
     try:
-        table = freshness(Path(words[0] if words else "results"))
+        found = freshness(Path(words[0] if words else "results"))
     except (RecordsError, OSError) as error:
         raise SystemExit(f"strainbench.report.freshness: {error}") from None
-    print(markdown(table))
+    print("\n\n".join(map(str, found)))
+    print(f"\n{sum(bool(s.older) for s in found)} of {len(found)} folders are older than the code.")
 
 
 if __name__ == "__main__":

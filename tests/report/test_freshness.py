@@ -22,7 +22,10 @@ README = """\
 
 
 def lines(root):
-    return {name: rest for name, *rest in freshness(root).lines}
+    return {
+        name: [measured, "; ".join(older), "; ".join(told)]
+        for name, measured, older, told in freshness(root)
+    }
 
 
 def git(folder, *words):
@@ -41,7 +44,19 @@ def root(tmp_path):
 def test_rows_of_the_code_as_it_is_are_older_than_nothing(root):
     measure(root / "runs", "none", seconds=1)
     command = "make bench; strainbench run swing --steps 2"
-    assert lines(root) == {"runs": ["1 cells", FRESH, command]}
+    assert lines(root) == {"runs": ["1 cells", "", command]}
+
+
+def test_it_is_printed_with_commands_on_lines_of_their_own(root, capsys):
+    measure(root / "runs", "none", seconds=1)
+    main([str(root)])
+    assert capsys.readouterr().out.splitlines() == [
+        f"runs (1 cells): {FRESH}",
+        "    make bench",
+        "    strainbench run swing --steps 2",
+        "",
+        "0 of 1 folders are older than the code.",
+    ]
 
 
 def test_rows_of_another_version_are_counted(root):
