@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from strainbench.studies.stability.axis import Axis, parse_axis
 from strainbench.studies.stability.refine import coarseness, inferred, wanted
-from strainbench.studies.stability.words import boundary
+from strainbench.studies.stability.words import FAILS, HOLDS, LATE, boundary
 
 
 def evaluated(shape, truth, stride=4):
@@ -93,23 +93,28 @@ def test_boundaries_in_words():
     x = Axis("limit", ("1", "2", "3"), ("1%", "2%", "3%"))
     y = Axis("step", ("1", "2", "3", "4"), ("1/4", "1/3", "1/2", "1"))
     rows = ["FHH", "FHH", "FFF", "HFH"]
-    holds = {(i, j): c == "H" for j, row in enumerate(rows) for i, c in enumerate(row)}
-    assert boundary(x, y, holds) == [
+    verbs = {"H": HOLDS, "F": FAILS, "L": LATE}
+    did = {(i, j): verbs[c] for j, row in enumerate(rows) for i, c in enumerate(row)}
+    assert boundary(x, y, did) == [
         "holds from limit 2% on (fails at 1%) at step 1/4 to 1/3",
         "fails at every limit at step 1/2",
         "irregular between limit 1% and 3% at step 1",
     ]
-    always = dict.fromkeys(holds, True)
+    assert boundary(x, y, did | {(0, 0): LATE, (1, 2): LATE})[::2] == [
+        "holds from limit 2% on (runs out of time at 1%) at step 1/4",
+        "fails or runs out of time at every limit at step 1/2",
+    ]
+    always = dict.fromkeys(did, HOLDS)
     assert boundary(x, y, always) == ["holds at every limit everywhere"]
     del always[0, 0]
-    always[2, 0] = False
+    always[2, 0] = FAILS
     assert boundary(x, y, always)[0] == "holds up to limit 2% (fails at 3%) at step 1/4"
 
 
 def test_what_is_not_known_of_every_level_is_not_said_of_it():
     x = Axis("limit", ("1%", "2%", "3%"), ("1%", "2%", "3%"))
     y = Axis("step", ("1/60",), ("1/60",))
-    (said,) = boundary(x, y, {(0, 0): True, (2, 0): True})
+    (said,) = boundary(x, y, {(0, 0): HOLDS, (2, 0): HOLDS})
     assert said == "holds at every limit run everywhere"
 
 

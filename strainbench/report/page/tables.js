@@ -172,7 +172,7 @@ function drawMaps() {
   });
   box.replaceChildren(
     el("h3", {}, `Map over ${names.x} and ${names.y}`),
-    el("p", { class: "caption" }, "✓ optimal on every step, ○ within the limits, ✗ neither; empty: not run, as the cells around it agree. A square opens its record."),
+    el("p", { class: "caption" }, "✓ optimal on every step, ○ within the limits, ✗ violated, ◔ out of time, ∅ no answer; empty: not run, as the cells around it agree. A square opens its record."),
     el("div", { class: "maps" }, ...grids),
   );
 }
@@ -182,6 +182,7 @@ function mapSpot(spot, method, names, [x, y]) {
   const [, , ending, why, id] = spot;
   const cell = cellOf.get(id);
   const title = [`${method} at ${names.x} ${x}, ${names.y} ${y}`, [WORDS[ending], why].filter(Boolean).join(": "), cell?.time ? duration(cell.time) : ""].filter(Boolean).join("; ");
-  const look = { optimal: "optimal", feasible: "feasible" }[ending] ?? "violated";
-  return el("button", { type: "button", class: `square ${look}`, title, onclick: () => openDrawer(id) }, SIGNS[ending]);
+  const look = ending.replaceAll(" ", "-");
+  const mark = { "out of time": "◔", "no answer": "∅" }[ending] ?? SIGNS[ending];
+  return el("button", { type: "button", class: `square ${look}`, title, onclick: () => openDrawer(id) }, mark);
 }

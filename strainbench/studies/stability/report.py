@@ -9,16 +9,18 @@ from strainbench.document import Column, Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.charts import Target, draw
-from strainbench.report.measures import OPTIMAL, SIGNS
+from strainbench.report.measures import NO_ANSWER, OPTIMAL, OUT_OF_TIME, SIGNS
 from strainbench.studies.stability.chart import map_chart
-from strainbench.studies.stability.measure import Map
-from strainbench.studies.stability.words import boundary
+from strainbench.studies.stability.measure import Map, Spot
+from strainbench.studies.stability.words import FAILS, HOLDS, LATE, boundary
 
 EXPLANATION = (
-    "✓ optimal on every step, ○ within the limits on every step, ✗ neither. In brackets: not run, "
-    "as the cells around agree. A sentence names the two cells between which a method changes; "
-    "where outcomes along a line change more than once it says irregular."
+    "✓ optimal on every step, ○ within the limits on every step, ✗ limits violated, ◔ out of time, "
+    "∅ no answer. In brackets: not run, as the cells around agree. A sentence names the two cells "
+    "between which a method changes; where outcomes along a line change more than once it says "
+    "irregular."
 )
+MARKS = SIGNS | {OUT_OF_TIME: "◔", NO_ANSWER: "∅"}
 CELLS = (
     *("method", "x", "y", "outcome", "why", "failure", Column("first failing step")),
     *(Column("time of that", "s"), Column("share of failed steps"), Column("median", "s"), "cell"),
@@ -62,22 +64,26 @@ def _section(found: Map, method: str) -> Document:
 def sentences(found: Map, method: str) -> list[str]:
     """Where a method keeps the limits, and where it reaches the optimum."""
     spots = found.spots[method]
-    kept = {point: spot.holds for point, spot in spots.items()}
+    kept = {point: HOLDS if spot.holds else _failing(spot) for point, spot in spots.items()}
     far = "So far: " if found.open else ""
     said = [f"{far}{method} {line}." for line in boundary(found.x, found.y, kept)]
     if any(spot.ending == OPTIMAL for spot in spots.values()):
-        best = {point: spot.ending == OPTIMAL for point, spot in spots.items()}
+        best = {p: HOLDS if s.ending == OPTIMAL else _failing(s) for p, s in spots.items()}
         if best != kept:
             lines = "; ".join(boundary(found.x, found.y, best))
             said.append(f"The optimum on every step: {lines}.")
     return said
 
 
+def _failing(spot: Spot) -> str:
+    return LATE if spot.ending == OUT_OF_TIME else FAILS
+
+
 def _sign(found: Map, method: str, i: int, j: int) -> str:
     ending = found.endings(method).get((i, j))
     if ending is None:
         return ""
-    return SIGNS[ending] if (i, j) in found.spots[method] else f"({SIGNS[ending]})"
+    return MARKS[ending] if (i, j) in found.spots[method] else f"({MARKS[ending]})"
 
 
 def _cells(found: Map) -> Iterator[tuple[object, ...]]:

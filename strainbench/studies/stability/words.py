@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import groupby, pairwise
 
 from strainbench.studies.stability.axis import Axis
 from strainbench.studies.stability.refine import Point
 
+HOLDS, FAILS, LATE = "holds", "fails", "runs out of time"
 
-def boundary(x: Axis, y: Axis, holds: Mapping[Point, bool]) -> list[str]:
+
+def boundary(x: Axis, y: Axis, did: Mapping[Point, str]) -> list[str]:
     """Sentences that say where along x a method holds, for the levels of y.
 
     Parameters
     ----------
-    holds : of each point (index along x, along y) that is known, whether the method held there
+    did : of each point (index along x, along y) that is known, what the method did there: HOLDS,
+        or a verb of how it failed
     """
-    lines = [
-        (j, _line(x, [holds.get((i, j)) for i in range(len(x.words))])) for j in _levels(holds)
-    ]
+    rows: dict[int, dict[int, str]] = {}
+    for (i, j), verb in sorted(did.items()):
+        rows.setdefault(j, {})[i] = verb
+    lines = [(j, _line(x, rows[j])) for j in sorted(rows)]
     sentences = []
     for said, group in groupby(lines, key=lambda line: line[1]):
         levels = [j for j, _ in group]
@@ -28,21 +32,16 @@ def boundary(x: Axis, y: Axis, holds: Mapping[Point, bool]) -> list[str]:
     return sentences
 
 
-def _levels(holds: Mapping[Point, bool]) -> list[int]:
-    return sorted({j for _, j in holds})
-
-
-def _line(x: Axis, held: Sequence[bool | None]) -> str:
+def _line(x: Axis, did: Mapping[int, str]) -> str:
     """One line of a map: where it changes, or that it does not, or that it does more than once."""
-    known = [(i, h) for i, h in enumerate(held) if h is not None]
-    changes = [(i, j) for (i, a), (j, b) in pairwise(known) if a != b]
+    changes = [(i, j) for i, j in pairwise(did) if (did[i] == HOLDS) != (did[j] == HOLDS)]
     name, at = x.key, x.shown
     if not changes:
-        run = "" if len(known) == len(held) else " run"
-        return f"{'holds' if known[0][1] else 'fails'} at every {name}{run}"
+        run = "" if len(did) == len(x.words) else " run"
+        return f"{' or '.join(sorted(set(did.values())))} at every {name}{run}"
     if len(changes) > 1:
         return f"irregular between {name} {at[changes[0][0]]} and {at[changes[-1][1]]}"
     below, above = changes[0]
-    if held[above]:
-        return f"holds from {name} {at[above]} on (fails at {at[below]})"
-    return f"holds up to {name} {at[below]} (fails at {at[above]})"
+    if did[above] == HOLDS:
+        return f"holds from {name} {at[above]} on ({did[below]} at {at[below]})"
+    return f"holds up to {name} {at[below]} ({did[above]} at {at[above]})"
