@@ -26,7 +26,7 @@ from strainbench.studies.stability.refine import Point, coarseness, inferred, wa
 LONG, FEWEST = 2.0, 40
 """Seconds of a scene's time, and steps: within the longer of them outcomes settle. Counts run out
 by step 21, cloth explodes by step 40 (swing, 10 squares)."""
-BATCH = 64  # cells at most between two looks at the budget
+BATCH = 16  # cells at most between two looks at the budget
 PATIENCE = 2  # steps after the first that violates its limits
 Planner = Callable[[Sequence[str]], list[Cell]]
 """The cells of all methods with so many further words of --set."""
