@@ -18,7 +18,6 @@ from strainbench.sources import PACKAGES
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-NO_CODE = {".pyc"}
 
 
 def test_all_places_name_one_version():
@@ -68,7 +67,7 @@ def test_a_wheel_holds_all_of_our_packages_and_nothing_else(wheel):
         path.relative_to(ROOT).as_posix()
         for package in PACKAGES
         for path in (ROOT / package).rglob("*")
-        if path.is_file() and path.suffix not in NO_CODE
+        if path.is_file() and "__pycache__" not in path.parts
     }
     about = {name for name in wheel if ".dist-info/" in name}
     assert wheel - about == files
