@@ -44,8 +44,8 @@ def test_every_number_that_was_found_stands_in_a_record(name):
 @pytest.mark.parametrize("name", TEXTS)
 def test_most_numbers_that_are_altered_by_hand_are_found_out(name):
     rng = random.Random(0)
-    some = [altered(f, rng) for f in rng.sample(told(name), SOME)]
-    assert sum(not f.found for f in some) >= TEXTS[name] * SOME
+    wrong = [altered(f, rng) for f in told(name)]
+    assert sum(not f.found for f in wrong) >= TEXTS[name] * len(wrong)
 
 
 def test_precision_is_that_at_which_a_number_is_told():
