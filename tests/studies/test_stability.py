@@ -43,9 +43,12 @@ def test_a_map_is_made_and_goes_on(tmp_path):
     assert 6 <= len(rows) <= 2 * 8
     assert "(✓)" in (tmp_path / "out" / "map.md").read_text()
     assert (tmp_path / "out" / "map-gentle.pdf").read_bytes()[:4] == b"%PDF"
-    again = strainbench(*words, cwd=tmp_path).stdout
-    assert len(read_rows(tmp_path / "out" / RUNS, RUN_COLUMNS)) == len(rows)
-    assert "gentle holds from limit" in again
+    whole = (tmp_path / "out" / "map.csv").read_bytes()
+    for budget in ("20min", "0.001s"):  # what is there costs none
+        again = strainbench(*words, "--budget", budget, cwd=tmp_path).stdout
+        assert len(read_rows(tmp_path / "out" / RUNS, RUN_COLUMNS)) == len(rows)
+        assert "gentle holds from limit" in again
+        assert (tmp_path / "out" / "map.csv").read_bytes() == whole
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("90s", 90), ("20min", 1200), ("1.5h", 5400)])

@@ -116,7 +116,7 @@ def measure(
 
     Parameters
     ----------
-    budget : [s] after which no further batch of cells is begun
+    budget : [s] after which no further batch of cells is begun; what the folder has costs none
     """
     until = time.monotonic() + budget
     plans: dict[Point, dict[str, Cell]] = {}
@@ -131,22 +131,25 @@ def measure(
     plan((len(x.words) - 1, len(y.words) - 1))  # words that are wrong fail here
     methods = list(plan((0, 0)))
     found = Map(x, y, {method: {} for method in methods})
+    runner = Runner(settings, observer)
 
     def batches() -> Iterator[list[Cell]]:
         while asked := {(method, point) for method in methods for point in found.wanted(method)}:
-            if time.monotonic() > until:
-                found.open = len(asked)
-                return
-            batch = sorted(asked, key=lambda a: (-coarseness(found.shape, a[1]), a[1], a[0]))[
-                :BATCH
-            ]
-            cells = {(method, point): plan(point)[method] for method, point in batch}
-            yield list(cells.values())
-            spots = read_spots(settings.folder, [cell.key for cell in cells.values()])
-            for (method, point), cell in cells.items():
-                found.spots[method][point] = spots[cell.key]
+            cells = {(method, point): plan(point)[method] for method, point in asked}
+            batch = [at for at, cell in cells.items() if runner.is_finished(cell)]
+            if not batch:
+                if time.monotonic() > until:
+                    found.open = len(asked)
+                    return
+                batch = sorted(
+                    asked, key=lambda at: (-coarseness(found.shape, at[1]), at[1], at[0])
+                )[:BATCH]
+            yield [cells[at] for at in batch]
+            spots = read_spots(settings.folder, [cells[at].key for at in batch])
+            for method, point in batch:
+                found.spots[method][point] = spots[cells[method, point].key]
 
-    Runner(settings, observer).run_batches(batches())
+    runner.run_batches(batches())
     return found
 
 
