@@ -33,6 +33,7 @@ ASKED = (
     *("solve_seconds_median", "solve_seconds_mean"),
 )
 """Columns of steps, and of runs, that measures are taken of."""
+NOT_INSTALLED = "not installed"
 MANY_TIMES = 1e5
 NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
@@ -119,7 +120,7 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
     cut_off = [step for step, status in failed if by_clock(status)]
     ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
     if ended or (run["outcome"] != NO_ANSWER and 0 < len(cut_off) == len(failed)):
-        done -= len(set(cut_off))
+        done = len(set(steps["step"]).difference(cut_off)) if len(steps) else done
         return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
     if run["outcome"] == NO_ANSWER:
         return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
@@ -128,7 +129,7 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
 
 def cause(reason: str) -> str:
     """Why there is no answer, in at most four words."""
-    known = {Ending.UNAVAILABLE: "not installed", Ending.UNSUPPORTED: "refuses the problem"}
+    known = {Ending.UNAVAILABLE: NOT_INSTALLED, Ending.UNSUPPORTED: "refuses the problem"}
     ending = Ending.of(reason)
     if ending is not None:
         return known.get(ending, " ".join(ending.split()[:4]))

@@ -61,6 +61,11 @@ def test_without_anything_to_project_there_is_no_time():
             (FREE,),
             Finish("out of time", 1, 3, "1 of 3"),
         ),
+        (
+            run("no answer", "time limit of 9 s (1 of 3 steps); it says 'time limit'", 1),
+            (FREE, (2, "no answer", "time limit", 9.0, 9)),
+            Finish("out of time", 1, 3, "1 of 3"),
+        ),
         (run("no answer", "unavailable: x", 0), (), Finish("no answer", 0, 3, "not installed")),
         (
             run("no answer", "positions that are not finite; it says 'a' (1 of 3 steps)", 1),
