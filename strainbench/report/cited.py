@@ -176,6 +176,8 @@ def main(words: Sequence[str]) -> None:
     try:
         for path in write_cited(Path(words[0] if words else "paper")):
             print(path)
+    except FileNotFoundError as missing:
+        raise SystemExit(f"strainbench.report.cited: {missing.filename} is not there") from None
     except (NotCitedError, RecordsError, tomllib.TOMLDecodeError, OSError) as error:
         raise SystemExit(f"strainbench.report.cited: {error}") from None
 
