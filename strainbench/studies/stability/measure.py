@@ -7,15 +7,14 @@ again, and `strainbench report` reads it.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import nan
-from pathlib import Path
 
 import pandas as pd
 
 from strainbench.bench.cell import Cell
-from strainbench.bench.columns import STEP_COLUMNS, WORDS
+from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS, WORDS
 from strainbench.bench.records import latest_runs, latest_steps
 from strainbench.bench.runner import Runner, Settings
 from strainbench.progress import Observer
@@ -26,10 +25,11 @@ from strainbench.studies.stability.refine import Point, coarseness, inferred, wa
 LONG, FEWEST = 2.0, 40
 """Seconds of a scene's time, and steps: within the longer of them outcomes settle. Counts run out
 by step 21, cloth explodes by step 40 (swing, 10 squares)."""
-BATCH = 16  # cells at most between two looks at the budget
+BATCH = 16  # cells a job at most between two looks at the budget
 PATIENCE = 2  # steps after the first that violates its limits
 Planner = Callable[[Sequence[str]], list[Cell]]
 """The cells of all methods with so many further words of --set."""
+Row = Mapping[str, object]
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ def measure(
     plan((len(x.words) - 1, len(y.words) - 1))  # words that are wrong fail here
     methods = list(plan((0, 0)))
     found = Map(x, y, {method: {} for method in methods})
-    runner = Runner(settings, observer)
+    runner = _Noting(settings, observer)
 
     def batches() -> Iterator[list[Cell]]:
         while asked := {(method, point) for method in methods for point in found.wanted(method)}:
@@ -143,9 +143,9 @@ def measure(
                     return
                 batch = sorted(
                     asked, key=lambda at: (-coarseness(found.shape, at[1]), at[1], at[0])
-                )[:BATCH]
+                )[: BATCH * settings.jobs]
             yield [cells[at] for at in batch]
-            spots = read_spots(settings.folder, [cells[at].key for at in batch])
+            spots = runner.spots([cells[at].key for at in batch])
             for method, point in batch:
                 found.spots[method][point] = spots[cells[method, point].key]
 
@@ -169,16 +169,40 @@ def _method(cell: Cell, swept: bool) -> str:
     return cell.solver.label.partition("[")[0] if swept else cell.solver.label
 
 
-def read_spots(folder: Path, keys: Sequence[str]) -> dict[str, Spot]:
-    """What became of the cells with these keys, which have all been run."""
-    rows = latest_runs(folder)
-    runs = pd.DataFrame([rows[key] for key in keys])
-    counted = runs.columns.difference(WORDS)
-    runs = runs.assign(**{c: pd.to_numeric(runs[c].replace("", nan)) for c in counted})
-    steps = numbers(pd.DataFrame(latest_steps(folder), columns=list(STEP_COLUMNS)))
-    own = dict(iter(steps.groupby("cell")))
-    none = steps.iloc[:0]
-    return {run["cell"]: _spot(run, own.get(run["cell"], none)) for _, run in runs.iterrows()}
+class _Noting(Runner):
+    """A runner that notes what it writes: reading the folder again costs more the more it has."""
+
+    def __init__(self, settings: Settings, observer: Observer | None) -> None:
+        super().__init__(settings, observer)
+        self._noted: dict[str, tuple[Row, Sequence[Row]]] = {}
+
+    def write(self, cell: Cell, row: dict[str, object], steps: Sequence[dict[str, object]]) -> None:
+        """Append a cell's rows, and keep them."""
+        super().write(cell, row, steps)
+        self._noted[cell.key] = row, steps
+
+    def spots(self, keys: Sequence[str]) -> dict[str, Spot]:
+        """What became of the cells with these keys, which have all been run."""
+        if not self._noted.keys() >= set(keys):
+            self._read()
+        runs = _table([self._noted[key][0] for key in keys], RUN_COLUMNS)
+        counted = runs.columns.difference(WORDS)
+        runs = runs.assign(**{c: pd.to_numeric(runs[c].replace("", nan)) for c in counted})
+        steps = {key: numbers(_table(self._noted[key][1], STEP_COLUMNS)) for key in keys}
+        return {run["cell"]: _spot(run, steps[run["cell"]]) for _, run in runs.iterrows()}
+
+    def _read(self) -> None:
+        """Note what the folder has."""
+        steps: dict[str, list[Row]] = {}
+        for row in latest_steps(self.settings.folder):
+            steps.setdefault(row["cell"], []).append(row)
+        rows = latest_runs(self.settings.folder)
+        self._noted = {key: (row, steps.get(key, [])) for key, row in rows.items()}
+
+
+def _table(rows: Sequence[Row], columns: Sequence[str]) -> pd.DataFrame:
+    """Rows as a file would have them: what has no value is empty."""
+    return pd.DataFrame(rows, columns=columns, dtype=object).fillna("")
 
 
 def _spot(run: pd.Series, steps: pd.DataFrame) -> Spot:

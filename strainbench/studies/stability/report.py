@@ -53,8 +53,9 @@ def as_document(found: Map, title: str, command: str) -> Document:
 
 
 def _section(found: Map, method: str) -> Document:
+    across, endings, run = range(len(found.x.words)), found.endings(method), found.spots[method]
     lines = [
-        [found.y.shown[j], *(_sign(found, method, i, j) for i in range(len(found.x.words)))]
+        [found.y.shown[j], *(_sign(endings.get((i, j)), (i, j) in run) for i in across)]
         for j in reversed(range(len(found.y.words)))
     ]
     corner = f"{found.y.key} \\ {found.x.key}"
@@ -79,11 +80,11 @@ def _failing(spot: Spot) -> str:
     return LATE if spot.ending == OUT_OF_TIME else FAILS
 
 
-def _sign(found: Map, method: str, i: int, j: int) -> str:
-    ending = found.endings(method).get((i, j))
+def _sign(ending: str | None, run: bool) -> str:
+    """Of a cell, in brackets where it was not run; nothing where it is not known."""
     if ending is None:
         return ""
-    return MARKS[ending] if (i, j) in found.spots[method] else f"({MARKS[ending]})"
+    return MARKS[ending] if run else f"({MARKS[ending]})"
 
 
 def _cells(found: Map) -> Iterator[tuple[object, ...]]:
