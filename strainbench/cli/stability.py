@@ -67,7 +67,7 @@ def draw_map(
 
     with Display(lines=False) as display, keeping(lambda: display.kept(display.finished)):
         found = measure(across, up, planner, settings, seconds, display)
-    found.lasts = _lasts(steps, duration)
+    found.lasts = _lasts(steps, duration, time_limit)
     say(f"{found.counted}; {found.lasts[0].lower()}{found.lasts[1:]}")
     for method in found.spots:
         for sentence in sentences(found, method):
@@ -99,12 +99,15 @@ def _cells(
     return [replace(cell, patience=PATIENCE) for cell in whole]
 
 
-def _lasts(steps: int | None, duration: float | None) -> str:
+def _lasts(steps: int | None, duration: float | None, time_limit: float | None) -> str:
     from strainbench.studies.stability import FEWEST, LONG, PATIENCE
 
     longest = f"the longer of {LONG:g} s of the scene and {FEWEST} steps"
     length = f"{duration:g} s of the scene" if duration else f"{steps} steps" if steps else longest
-    return f"A cell lasts {length}, and ends {PATIENCE} steps after limits are first violated."
+    clock = f"; it is out of time after {time_limit:g} s" if time_limit else ""
+    return (
+        f"A cell lasts {length}, and ends {PATIENCE} steps after limits are first violated{clock}."
+    )
 
 
 def parse_budget(text: str) -> float:
