@@ -41,7 +41,11 @@ def test_a_map_is_made_and_goes_on(tmp_path):
     assert {s["cell"] for s in spots} == {r["cell"] for r in rows}
     assert {s["outcome"] for s in spots} == {"optimal", "no answer"}
     assert 6 <= len(rows) <= 2 * 8
-    assert "(✓)" in (tmp_path / "out" / "map.md").read_text()
+    told = (tmp_path / "out" / "map.md").read_text()
+    assert "(✓)" in told
+    shares = re.search(r"^\| gentle \| (\d+) \| (\d+) \|$", told, re.MULTILINE)
+    assert shares
+    assert abs(int(shares[1]) + int(shares[2]) - 100) <= 1
     assert (tmp_path / "out" / "map-gentle.pdf").read_bytes()[:4] == b"%PDF"
     whole = (tmp_path / "out" / "map.csv").read_bytes()
     for budget in ("20min", "0.001s"):  # what is there costs none

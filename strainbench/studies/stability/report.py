@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +20,9 @@ EXPLANATION = (
     "∅ no answer. In brackets: not run, as the cells around agree. A sentence names the two cells "
     "between which a method changes; where outcomes along a line change more than once it says "
     "irregular."
+)
+SHARES = (
+    "Shares of the whole map, what is inferred counted too; what is missing to 100 is not known."
 )
 MARKS = SIGNS | {OUT_OF_TIME: "◔", NO_ANSWER: "∅"}
 CELLS = (
@@ -49,7 +53,19 @@ def as_document(found: Map, title: str, command: str) -> Document:
     if found.open:
         about += f" The budget ended it with {found.open} more to run: the same command goes on."
     sections = [_section(found, method) for method in found.spots]
-    return Document(title, [about, Prose(EXPLANATION), f"Made by {command}", *sections])
+    made = f"Made by {command}"
+    return Document(title, [about, Prose(EXPLANATION), made, SHARES, _shares(found), *sections])
+
+
+def _shares(found: Map) -> Table:
+    """How much of the map each method holds, those that hold most first."""
+    whole = found.shape[0] * found.shape[1]
+    counts = {method: Counter(found.endings(method).values()) for method in found.spots}
+    endings = [e for e in MARKS if any(count[e] for count in counts.values())]
+    order = sorted(counts, key=lambda m: [counts[m][e] for e in MARKS], reverse=True)
+    lines = [[m, *(round(100 * counts[m][e] / whole) for e in endings)] for m in order]
+    columns = [Column("method", whole=True), *(Column(e, "%", right=True) for e in endings)]
+    return Table("", columns, lines)
 
 
 def _section(found: Map, method: str) -> Document:
