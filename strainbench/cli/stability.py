@@ -103,7 +103,8 @@ def _lasts(steps: int | None, duration: float | None, time_limit: float | None) 
     from strainbench.studies.stability import FEWEST, LONG, PATIENCE
 
     longest = f"the longer of {LONG:g} s of the scene and {FEWEST} steps"
-    length = f"{duration:g} s of the scene" if duration else f"{steps} steps" if steps else longest
+    counted = f"{steps} step{'s' if steps != 1 else ''}" if steps else longest
+    length = f"{duration:g} s of the scene" if duration else counted
     clock = f"; it is out of time after {time_limit:g} s" if time_limit else ""
     return (
         f"A cell lasts {length}, and ends {PATIENCE} steps after limits are first violated{clock}."

@@ -46,6 +46,7 @@ def test_a_map_is_made_and_goes_on(tmp_path):
     shares = re.search(r"^\| gentle \| (\d+) \| (\d+) \|$", told, re.MULTILINE)
     assert shares
     assert abs(int(shares[1]) + int(shares[2]) - 100) <= 1
+    assert (tmp_path / "out" / "map.png").read_bytes()[1:4] == b"PNG"
     assert (tmp_path / "out" / "map-gentle.pdf").read_bytes()[:4] == b"%PDF"
     whole = (tmp_path / "out" / "map.csv").read_bytes()
     for budget in ("20min", "0.001s"):  # what is there costs none

@@ -13,6 +13,7 @@ from strainbench.options import shown
 
 FACTOR = 1.3  # between two levels of a range, at most
 MOST_LEVELS = 100
+UNITS = {"step": "s", "resolution": "cells a side"}
 VALID = "KEY=FROM..TO, as limit=0.01%..20% or step=1/240..1/5, or KEY=V1,V2,V3 is valid"
 
 
@@ -30,6 +31,11 @@ class Axis:
     key: str
     words: tuple[str, ...]
     shown: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """The setting with its unit."""
+        return f"{self.key} [{UNITS[self.key]}]" if self.key in UNITS else self.key
 
     def setting(self, level: int) -> str:
         """The words of --set for a level."""

@@ -41,8 +41,8 @@ def map_chart(found: Map, method: str, target: Target) -> Chart:
     axis |= {"labelFont": FONT, "titleFont": FONT, "ticks": False, "domain": False}
     x: dict[str, Any] = {"field": "x", "type": "ordinal", "sort": list(found.x.shown)}
     y: dict[str, Any] = {"field": "y", "type": "ordinal", "sort": list(reversed(found.y.shown))}
-    x["axis"] = axis | {"title": found.x.key, "labelAngle": -45}
-    y["axis"] = axis | {"title": found.y.key}
+    x["axis"] = axis | {"title": found.x.title, "labelAngle": -45}
+    y["axis"] = axis | {"title": found.y.title}
     colours = {"domain": list(FILLS), "range": list(FILLS.values())}
     mark = {"type": "rect", "stroke": "#DADCE0", "strokeWidth": 0.5, "tooltip": {"content": "data"}}
     run = {"condition": {"test": "datum.run", "value": 1}, "value": INFERRED}

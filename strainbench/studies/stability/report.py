@@ -9,7 +9,7 @@ from pathlib import Path
 from strainbench.document import Column, Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
-from strainbench.report.charts import Target, draw
+from strainbench.report.charts import Target, draw, draw_sheet
 from strainbench.report.measures import NO_ANSWER, OPTIMAL, OUT_OF_TIME, SIGNS
 from strainbench.studies.stability.chart import map_chart
 from strainbench.studies.stability.measure import Map, Spot
@@ -32,7 +32,7 @@ CELLS = (
 
 
 def write_map(found: Map, title: str, command: str, folder: Path) -> list[Path]:
-    """map.md, map.csv, and map-METHOD.svg and .pdf."""
+    """map.md, map.csv, map-METHOD.svg and .pdf, and all of them on one sheet, map.png."""
     texts = {
         "map.md": markdown(as_document(found, title, command)),
         "map.csv": csv(Table("", CELLS, list(_cells(found)))),
@@ -44,6 +44,8 @@ def write_map(found: Map, title: str, command: str, folder: Path) -> list[Path]:
         for ending, target in ((".svg", Target.PAGE), (".pdf", Target.PAPER)):
             paths.append(folder / f"map-{method.replace('/', '-')}{ending}")
             draw(map_chart(found, method, target), paths[-1])
+    paths.append(folder / "map.png")
+    draw_sheet([map_chart(found, m, Target.PAPER) for m in found.spots], paths[-1:], columns=4)
     return paths
 
 
@@ -74,7 +76,7 @@ def _section(found: Map, method: str) -> Document:
         [found.y.shown[j], *(_sign(endings.get((i, j)), (i, j) in run) for i in across)]
         for j in reversed(range(len(found.y.words)))
     ]
-    corner = f"{found.y.key} \\ {found.x.key}"
+    corner = f"{found.y.title} \\ {found.x.title}"
     return Document(method, [*sentences(found, method), Table("", [corner, *found.x.shown], lines)])
 
 
