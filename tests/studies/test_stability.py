@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import re
+from math import nan
 
 import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS
 from strainbench.bench.records import RUNS, read_rows
 from strainbench.cli.stability import parse_budget
+from strainbench.studies.stability.axis import Axis
+from strainbench.studies.stability.measure import Map, Spot
+from strainbench.studies.stability.report import sentences
 from tests.cli.test_cli import strainbench
 
 GENTLE = """
@@ -54,6 +58,20 @@ def test_a_map_is_made_and_goes_on(tmp_path):
         assert len(read_rows(tmp_path / "out" / RUNS, RUN_COLUMNS)) == len(rows)
         assert "gentle holds from limit" in again
         assert (tmp_path / "out" / "map.csv").read_bytes() == whole
+
+
+def spot(ending):
+    return Spot("", ending, "", "", None, nan, 0.0, nan)
+
+
+def test_a_level_that_was_only_touched_says_nothing():
+    """Of what lies between the corners of a block; at a change it says between which cells."""
+    axes = [Axis(key, tuple(map(str, range(5))), tuple(map(str, range(5)))) for key in "xy"]
+    corners = {(i, j): spot("optimal" if i else "violated") for i in (0, 4) for j in (0, 4)}
+    found = Map(*axes, {"a": corners | {(2, 2): spot("optimal")}}, open=1)
+    assert sentences(found, "a") == ["So far: a holds from x 4 on (fails at 0) at y 0 to 4."]
+    found.spots["a"] |= {(0, 2): spot("violated")}
+    assert "So far: a holds from x 2 on (fails at 0) at y 2." in sentences(found, "a")
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("90s", 90), ("20min", 1200), ("1.5h", 5400)])

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from strainbench.document import Column, Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.charts import Target, draw, draw_sheet
-from strainbench.report.measures import NO_ANSWER, OPTIMAL, OUT_OF_TIME, SIGNS
+from strainbench.report.measures import COUNT, NO_ANSWER, OPTIMAL, OUT_OF_TIME, SIGNS
 from strainbench.studies.stability.chart import map_chart
 from strainbench.studies.stability.measure import Map, Spot
+from strainbench.studies.stability.refine import Point
 from strainbench.studies.stability.words import FAILS, HOLDS, LATE, boundary
 
 EXPLANATION = (
@@ -82,16 +83,31 @@ def _section(found: Map, method: str) -> Document:
 
 def sentences(found: Map, method: str) -> list[str]:
     """Where a method keeps the limits, and where it reaches the optimum."""
-    spots = found.spots[method]
-    kept = {point: HOLDS if spot.holds else _failing(spot) for point, spot in spots.items()}
     far = "So far: " if found.open else ""
+    kept, best = _verbs(found, method, COUNT), _verbs(found, method, (OPTIMAL,))
     said = [f"{far}{method} {line}." for line in boundary(found.x, found.y, kept)]
-    if any(spot.ending == OPTIMAL for spot in spots.values()):
-        best = {p: HOLDS if s.ending == OPTIMAL else _failing(s) for p, s in spots.items()}
-        if best != kept:
-            lines = "; ".join(boundary(found.x, found.y, best))
-            said.append(f"The optimum on every step: {lines}.")
+    reached = any(spot.ending == OPTIMAL for spot in found.spots[method].values())
+    if reached and best != kept and (lines := boundary(found.x, found.y, best)):
+        said.append(f"{far}The optimum on every step: {'; '.join(lines)}.")
     return said
+
+
+def _verbs(found: Map, method: str, good: Collection[str]) -> dict[Point, str]:
+    """What was seen at the points run, on the levels of y that it says something of.
+
+    These are the ones on which it changes, and those known from end to end to be alike: where a
+    refinement has only touched a level, what it touched says nothing of the rest.
+    """
+    spots, endings = found.spots[method], found.endings(method)
+
+    def says(level: int) -> bool:
+        seen = {spot.ending in good for (_, j), spot in spots.items() if j == level}
+        line = [endings.get((i, level)) for i in range(len(found.x.words))]
+        return len(seen) > 1 or (None not in line and len({e in good for e in line}) == 1)
+
+    told = {j for j in range(len(found.y.words)) if says(j)}
+    verbs = {at: HOLDS if s.ending in good else _failing(s) for at, s in spots.items()}
+    return {at: verb for at, verb in verbs.items() if at[1] in told}
 
 
 def _failing(spot: Spot) -> str:
