@@ -1,4 +1,4 @@
-"""What the referee says of the last answers of the tables of stability: residuals, no optima.
+"""What the referee says of answers of the tables of stability: residuals, no optima.
 
 Limits on principal stretches are not convex: no answer is certified as optimal, and none is ranked
 by its objective, as those that violate limits have lower ones.
@@ -35,12 +35,13 @@ Answers = Iterator[tuple[Problem, FloatArray]]
 
 @dataclass(frozen=True)
 class Certified:
-    """The last answer of a play."""
+    """An answer of a play."""
 
     case: str
     material: str
     method: str
-    steps: int  # until then
+    step: int
+    steps: int  # with an answer
     outcome: str  # the referee's
     violation: float | None
     residual: float | None  # of the KKT conditions, in the norm of the metric
@@ -90,16 +91,19 @@ def _of_start(start: str, material: str, method: str) -> Answers:
 
 
 def certified(case: str, material: str, method: str) -> Iterator[Certified]:
-    """The referee's words on the last answer."""
-    played = list(answers(case, material, method))
-    if not played:
-        yield Certified(case, material, method, 0, "no answer", None, None, None, "")
+    """The referee's words on the last answer with a limit that is active, if any has one."""
+    steps, judged = 0, None
+    for steps, answer in enumerate(answers(case, material, method), 1):
+        gap = smallest_gap(*answer)
+        if judged is None or np.isfinite(gap):
+            judged = steps, *answer, gap
+    if judged is None:
+        yield Certified(case, material, method, 0, 0, "no answer", None, None, None, "")
         return
-    frame, x = played[-1]
+    step, frame, x, gap = judged
     found = certify(frame, x, reference=Reference.local(frame, x))
-    gap = smallest_gap(frame, x)
     yield Certified(
-        *(case, material, method, len(played), found.outcome),
+        *(case, material, method, step, steps, found.outcome),
         violation=found.max_violation,
         residual=found.kkt_residual,
         gap=gap if np.isfinite(gap) else None,
@@ -118,18 +122,18 @@ PART = Part(
     3,
     cells,
     certified,
-    "Certificates of the last answers",
-    "What the referee says of the last answer of the plays above, at steps of 5 ms: the violation "
-    "of the limits themselves, depth within the table included; the residual of the KKT "
-    "conditions in the norm of the step's metric, 0 at a local optimum or a saddle, 1 where the "
-    "active limits explain nothing of the move from the candidate; the least difference of two "
-    "singular values of an element with an active limit. Up to 1e-6 the normals are those of one "
-    "decomposition of many, LAPACK's with rotations, and with limits by axis so is what is within "
-    "them. None is more than a local optimum, and objectives are not compared: an answer that "
-    "violates limits has a lower one.",
+    "What is certified",
+    "What the referee says of the plays above, at steps of 5 ms, of the last step that ends with "
+    "an active limit, or the first one if none does: the violation of the limits themselves, depth "
+    "within the table included; the residual of the KKT conditions in the norm of the step's "
+    "metric, 0 at a local optimum or a saddle, 1 where the active limits explain nothing of the "
+    "move from the candidate; the least difference of two singular values of an element with an "
+    "active limit. Up to 1e-6 the normals are those of one decomposition of many, LAPACK's with "
+    "rotations, and with limits by axis so is what is within them. None is more than a local "
+    "optimum, and objectives are not compared: an answer that violates limits has a lower one.",
     [
         *("case", "limits", "method"),
-        *numbers(("steps", "", "")),
+        *numbers(("step", "", ""), ("of", "", "")),
         "outcome",
         *numbers(("violation", "", ".1e"), ("KKT residual", "", ".1e"), ("gap", "", ".1e")),
         "reading",

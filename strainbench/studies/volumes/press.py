@@ -19,7 +19,8 @@ from strainbench.studies.volumes.part import Cell, Part, Plan, numbers, scene_of
 
 PRESSES, MATERIALS = ("flat", "side", "tip"), ("anisotropic", "isotropic")
 DEPTHS = (0.5, 1.0, 1.5, 2.0)  # [mm]
-FRICTIONS = (0.0, 0.25, 1.0)  # beside the scene's own .5, on the side to 1 mm
+FRICTIONS = (0.0, 0.25, 1.0)  # beside the scene's own .5, on the side
+STEEP = (1.0, 1.1)  # [mm], theirs
 SPEED = 20.0  # [mm/s]
 
 
@@ -81,7 +82,7 @@ def cells(_: Plan) -> Iterable[Cell]:
 
 def rows_of(press: str, material: str, friction: float) -> Iterator[Press]:
     """The depths of the table."""
-    return pressed(press, material, friction, DEPTHS if friction == 0.5 else (1.0,))
+    return pressed(press, material, friction, DEPTHS if friction == 0.5 else STEEP)
 
 
 def pressed(
@@ -114,8 +115,10 @@ PART = Part(
     "The scene `finger` by lcp-pgs, steps of 5 ms: the normal force on the table at a depth, with "
     "limits by axis and alike in all. Flat they are one material; on the side and on the tip the "
     "limits by axis soon make it rigid. Where sweeps have not converged no step within the limits "
-    "may be left, and the force grows with the sweeps that are allowed: rigid, it says. The "
-    "violation is that of the limits themselves, after linearised steps.",
+    "may be left, and the force grows with the sweeps that are allowed: rigid, it says. Friction "
+    "makes it rigid sooner: what a tenth of a millimetre more adds, where it is 1, says how much "
+    "such a force is worth on another mesh, or with another bone. The violation is that of the "
+    "limits themselves, after linearised steps.",
     [
         "press",
         "limits",
