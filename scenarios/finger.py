@@ -197,7 +197,8 @@ class Bone(Energy):
     @property
     def _along(self) -> FloatArray:
         """(3p,) the move along d of all, of unit length."""
-        return np.tile(self.towards, len(self.rest)) / np.sqrt(len(self.rest))
+        along: FloatArray = np.tile(self.towards, len(self.rest)) / np.sqrt(len(self.rest))
+        return along
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

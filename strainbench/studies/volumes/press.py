@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from strainbench.arrays import FloatArray
+from strainbench.document import Column
 from strainbench.scenario.scenario import StepReport
 from strainbench.scenario.stage import Stage, StageError
 from strainbench.solver.registry import find_solver
@@ -101,7 +102,7 @@ def pressed(
         yield Press(press, material, friction, depth, *pressing.found, str(error))
 
 
-FOUND = (
+FOUND: tuple[str | Column, ...] = (
     *numbers(("force", "N", ".3g"), ("rows", "", ""), ("contacts", "", ""), ("sweeps", "", "")),
     *numbers(("cone error", "", ".1g"), ("violation", "", ".2g")),
     "converged",
