@@ -59,8 +59,9 @@ class Finger(VolumeScenario):
     friction : Coulomb's coefficient; methods other than lcp-pgs take 0 alone.
     depth : how far the finger goes on from its first touch [m]. Where it isn't flat the
         anisotropic limits leave it 1 mm or so: further no step meets them.
-    force : the load on the bone [N], along the way it goes; it grows by 100 N/s from 0. Nothing is
-        pinned then, and each step can be met: the finger stays where it is. 0 is to a depth.
+    force : the load on the bone [N], along the way it goes, which grows by 100 N/s from 0. Nothing
+        is pinned then, so that a step from within the limits has an answer, to go no further. 0
+        is to a depth.
     """
 
     name = "finger"

@@ -9,12 +9,13 @@ import pytest
 
 from scenarios.finger import PRESSES, RATE, TILT, Finger
 from solvers.lcp_pgs import LcpPgs
-from strainbench.scenario.stage import Stage
+from solvers.lcp_qp import LcpQp
+from strainbench.scenario.stage import Stage, StageError
 
 
-def loaded(steps, **settings):
+def loaded(steps, solver=None, **settings):
     """The stage after so many steps, the scene's bone, and the force on the table [N]."""
-    stage, told = Stage.opened(Finger(**settings), LcpPgs()), {}
+    stage, told = Stage.opened(Finger(**settings), solver or LcpPgs()), {}
 
     def project(target):
         found = stage.solve(target)
@@ -54,6 +55,15 @@ def test_a_load_comes_as_deep_as_the_force_at_that_depth():
     assert force / RATE < 16 * 5e-3
     assert found == pytest.approx(force, rel=0.02)
     assert moves[:, 0].mean() == pytest.approx(5e-4, rel=0.03)
+
+
+def test_a_load_on_rigid_limits_has_an_answer_where_a_depth_has_none():
+    given = {"press": "tip", "friction": 0.0}
+    moves, force = loaded(28, LcpQp(), force=14.0, **given)
+    assert force == pytest.approx(14.0, rel=0.01)
+    assert 8e-4 < moves[:, 0].mean() < 9e-4
+    with pytest.raises(StageError, match="infeasible"):
+        list(Stage.opened(Finger(depth=2e-3, **given), LcpQp()).steps(10))
 
 
 def test_the_bone_has_the_derivatives_of_its_energy():
