@@ -1,4 +1,4 @@
-"""The finger pressed by a load that grows, in place of to a depth, so that each step has an answer."""
+"""The finger pressed by a load that grows, in place of to a depth."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ PART = Part(
     "The same finger with its bone free to go along the way it is pressed, by a load that grows by "
     "100 N/s: how deep it is when the load comes to so much, and the normal force on the table, "
     "which carries the load with its friction. A step from within the limits has an answer, to go "
-    "no further: rigid is a depth that a load twice as large adds little to, not a force that means "
-    f"nothing. Up to {SWEEPS} sweeps a round.",
+    "no further: rigid is a depth that a load twice as large adds little to, not a force that "
+    f"means nothing. Up to {SWEEPS} sweeps a round.",
     ["press", "limits", *numbers(("load", "N", "g"), ("depth", "mm", ".3f")), *FOUND],
 )
