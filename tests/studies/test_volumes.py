@@ -68,9 +68,10 @@ def test_a_folder_has_its_tables_and_their_command(tmp_path, monkeypatch, capsys
     assert costs["sweeps"].is_monotonic_increasing
     assert costs["solved"].iloc[0] == 100
     assert (costs["iterations"] < 40).all()
-    (row,) = pd.read_csv(tmp_path / "new" / "press.csv").itertuples()
+    row, deeper = pd.read_csv(tmp_path / "new" / "press.csv").itertuples()
     assert (row.press, row.depth_mm, row.friction) == ("side", 1.0, 1.0)
-    assert row.cone_error < 1e-14 < row.force
+    assert row.cone_error < 1e-14 < row.force < 0.5 * deeper.force
+    assert deeper.depth_mm == 1.1
     assert "| side | anisotropic | 1 | 1 |" in text
 
 

@@ -18,10 +18,12 @@ from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
 from strainbench.studies.volumes import (
     beams,
+    certificates,
     cousin,
     fig4,
     growth,
     press,
+    pressed_by_load,
     pressed_past,
     repeated,
     sweeps,
@@ -31,7 +33,8 @@ from strainbench.studies.volumes.part import Cell, Part, Plan
 
 PARTS = (
     *(fig4.PART, violation.PART, violation.TIGHT_PART, sweeps.PART, growth.PART, cousin.PART),
-    *(cousin.BEAM_PART, beams.PART, repeated.PART, press.PART, pressed_past.PART),
+    *(cousin.BEAM_PART, beams.PART, repeated.PART, press.PART, pressed_by_load.PART),
+    *(pressed_past.PART, certificates.PART),
 )
 
 
@@ -41,17 +44,24 @@ NAMES = tuple(part.name for part in PARTS)
 def measured(part: Part, plan: Plan, folder: Path) -> list[dict[str, object]]:
     """Rows of the plan's cells, those that the folder has from there; then its others.
 
-    The file is written after each cell.
+    The file is written after each cell, and in that order in the end.
     """
     file = folder / f"{part.name}.csv"
-    known, found = _read(file), list[dict[str, object]]()
+    before = known = _read(file)
+    found = list[dict[str, object]]()
     for cell in part.cells(plan):
         own = [row for row in known if _is_of(row, cell)]
         known = [row for row in known if row not in own]
         found += own or [_said(part.name, asdict(row)) for row in part.rows(*cell)]
         if not own:
-            write_whole(file, csv(Table.of(pd.DataFrame(found + known))).encode())
+            _write(file, found + known)
+    if found + known != before:
+        _write(file, found + known)
     return found + known
+
+
+def _write(file: Path, rows: list[dict[str, object]]) -> None:
+    write_whole(file, csv(Table.of(pd.DataFrame(rows))).encode())
 
 
 def _read(file: Path) -> list[dict[str, object]]:
