@@ -11,9 +11,10 @@ from strainbench.report.claims.claim import Finding, Verdict, claim
 from strainbench.report.claims.evidence import Evidence, NotThereError
 from strainbench.report.numbers import power
 
-VOLUMES = "python -m strainbench.studies.volumes --step 1,5,20 -o results/volumes"
+VOLUMES = "python -m strainbench.studies.volumes --step 1,5,20 --resolution 2,4 -o results/volumes"
 LIMIT = 0.05
 STEPS = (1.0, 5.0, 20.0)  # [ms]
+LOAD = 20.0  # [N]
 
 
 def _first(seen: Evidence, limits: str, step: float, resolution: int = 2) -> dict[str, float]:
@@ -26,8 +27,8 @@ def _first(seen: Evidence, limits: str, step: float, resolution: int = 2) -> dic
     return {name: float(rows.iloc[0][name]) for name in ("time_ms", "top", "stretch")}
 
 
-def _told(seen: Evidence, limits: str, steps: Sequence[float] = STEPS) -> str:
-    found = [_first(seen, limits, step) for step in steps]
+def _told(seen: Evidence, limits: str, steps: Sequence[float] = STEPS, resolution: int = 2) -> str:
+    found = [_first(seen, limits, step, resolution) for step in steps]
     return "; ".join(
         f"step {step:g} ms: after {f['time_ms']:.0f} ms, top at {f['top']:.2f} m, transverse "
         f"stretch {f['stretch']:.3f}"
@@ -99,7 +100,7 @@ def hyperbolic(seen: Evidence) -> Finding:
     return Finding(
         Verdict.of(all(abs(s - 1 - LIMIT) < 0.02 for s in stretches)),
         f"{_told(seen, 'hyperbolic')}.",
-        "On 1,600 tetrahedra: `python -m strainbench.studies.volumes --resolution 4 --part fig4`.",
+        f"On 1,600 tetrahedra: {_told(seen, 'hyperbolic', resolution=4)}.",
     )
 
 
@@ -136,6 +137,19 @@ def finger(seen: Evidence) -> Finding:
     return Finding(
         Verdict.of(abs(ratios["flat"] - 1) < 0.1 and stiffer > 1.5),
         f"Force at a depth of 1 mm: {'; '.join(told)}. Rigid: the solver was not done.",
+        f"Depth under a load of {LOAD:g} N: {_yielded(seen)}.",
+    )
+
+
+def _yielded(seen: Evidence) -> str:
+    """Depths [mm] under LOAD, anisotropic against isotropic."""
+    table = seen.table("volumes", "load.csv")
+    depths = table[table["load"] == LOAD].set_index(["press", "material"])["depth_mm"]
+    if depths.empty:
+        raise NotThereError(f"volumes holds no load of {LOAD:g} N")
+    return "; ".join(
+        f"{press} {depths[press, 'anisotropic']:.2f} against {depths[press, 'isotropic']:.2f} mm"
+        for press in ("flat", "side", "tip")
     )
 
 
