@@ -88,7 +88,7 @@ def sentences(found: Map, method: str) -> list[str]:
     said = [f"{far}{method} {line}." for line in boundary(found.x, found.y, kept)]
     reached = any(spot.ending == OPTIMAL for spot in found.spots[method].values())
     if reached and best != kept and (lines := boundary(found.x, found.y, best)):
-        said.append(f"{far}The optimum on every step: {'; '.join(lines)}.")
+        said.append(f"{far}{method}, with the optimum on every step, {'; '.join(lines)}.")
     return said
 
 
