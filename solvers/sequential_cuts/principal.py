@@ -1,0 +1,68 @@
+"""The projection within what touches isotropic limits: programs within ever more half-spaces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from solvers.sequential_cuts.halfspaces import HalfSpaces, Restriction
+from solvers.sequential_cuts.program import PRICE, Answer
+from solvers.sequential_cuts.quadratic import Quadratic
+from strainbench import Clock, Problem
+from strainbench.arrays import FloatArray
+
+PROGRAMS = 60
+"""At most, of one restriction."""
+CLOSE = 1e-3
+"""How far beyond a restriction its answer may be, over the tolerance."""
+PRESSED = 1e-6
+"""Half-spaces whose dual is above this part of the largest are those of the next round too."""
+
+
+class PrincipalProgram:
+    """Minimise the objective within the restriction that touches at some x.
+
+    Parameters
+    ----------
+    slack : whether the lower limits may lack t >= 0, at a price.
+    """
+
+    def __init__(self, slack: bool) -> None:
+        self.slack = slack
+        self._kept: tuple[Clock, HalfSpaces] | None = None  # of the projection with that clock
+
+    def solve(
+        self, problem: Problem, x: FloatArray, tolerance: float, deadline: Clock, dearer: float = 1
+    ) -> Answer:
+        """From the half-spaces near x on, until the answer is beyond no other."""
+        price = dearer * PRICE * len(problem.free) if self.slack else None
+        around, self._last = Restriction(problem, x), Quadratic(problem, price)
+        more, parts = self._first(around, x, deadline), list[HalfSpaces]()
+        for _ in range(PROGRAMS):
+            parts.append(more)
+            self._last.add(around.rows(more))
+            answer = self._last.solved(tolerance, deadline)
+            if not np.isfinite(answer.positions).all() or deadline.passed:
+                break
+            more = around.beyond(answer.positions, CLOSE * tolerance, self._last.slack)
+            if len(more.element) == 0:
+                break
+        cuts = HalfSpaces.of(parts)
+        duals = answer.duals[len(answer.duals) - len(cuts.element) :]
+        self._kept = deadline, cuts.those(duals > PRESSED * duals.max(initial=0.0))
+        return replace(answer, programs=len(parts))
+
+    def residual(self, problem: Problem, x: FloatArray, duals: FloatArray) -> float:
+        """Of the KKT conditions at x with the duals of the last answer."""
+        return self._last.residual(x, duals)
+
+    def multipliers(self, x: FloatArray, duals: FloatArray) -> None:
+        """None: half-spaces are no rows of G."""
+
+    def _first(self, around: Restriction, x: FloatArray, deadline: Clock) -> HalfSpaces:
+        """Those that x is near, and the ones that pressed in this projection's last round."""
+        near = around.beyond(x, -around.near)
+        if self._kept is None or self._kept[0] is not deadline:
+            return near
+        return HalfSpaces.of([near, around.renewed(self._kept[1])])
