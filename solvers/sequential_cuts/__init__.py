@@ -41,8 +41,8 @@ class SequentialCuts(Solver):
 
     Of limits on principal stretches it takes isotropic ones, in any metric, beside planes without
     friction. Its restriction of these (`solvers.sequential_cuts.halfspaces`) takes several programs
-    a round, each under more half-spaces than the last, which `iterations` counts. A round is kept
-    if it is within the limits, to the tolerance, and gains.
+    a round, which `iterations` counts. A round is kept if it is within the limits, to the
+    tolerance, and gains.
 
     | status | when |
     |---|---|
@@ -141,6 +141,8 @@ class SequentialCuts(Solver):
         if len(problem.free) == 0:
             return held_still(problem, tolerance)
         run = Run(problem, Limit(tolerance, self.max_rounds, deadline, monitor))
+        if isinstance(problem.kind, PrincipalLimits) and run.within(problem.target):
+            return Solution(problem.target.copy(), "solved", 0, details={"unconverged": 0.0})
         if state.repair is not None:
             return state.keep(self._best(run, state, state.repair), self.warm)
         if (last := state.serving(run)) is not None:

@@ -10,7 +10,7 @@ touches them there. It is what is left between the half-spaces
     u . F v <= hi  and  d . R^T F d >= lo  of all unit vectors u, v and d.
 
 Those that an F is beyond are of its singular vectors u and v, and of eigenvectors d of sym(R^T F).
-The former hold whatever R is, the latter for this one.
+The former hold whatever R is, the latter for this one; in the same direction d, for another.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The projection within what touches isotropic limits: programs within ever more half-spaces."""
+"""The projection within what touches isotropic limits, by programs within half-spaces.
+
+Each takes those that the last one's answer presses on, and those that it is beyond.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +19,12 @@ PROGRAMS = 60
 """At most, of one restriction."""
 CLOSE = 1e-3
 """How far beyond a restriction its answer may be, over the tolerance."""
+ROUGHLY = 0.1
+"""The same over the slack, while there is any: x_k is to be renewed anyway."""
 PRESSED = 1e-6
-"""Half-spaces whose dual is above this part of the largest are those of the next round too."""
+"""Half-spaces whose dual is below this part of the largest are left out of the next program: in
+the norm of a metric each optimum is above the last all the same, so that none comes back for ever.
+A beam's step takes the same programs so, in a third of the time."""
 
 
 class PrincipalProgram:
@@ -35,23 +42,24 @@ class PrincipalProgram:
     def solve(
         self, problem: Problem, x: FloatArray, tolerance: float, deadline: Clock, dearer: float = 1
     ) -> Answer:
-        """From the half-spaces near x on, until the answer is beyond no other."""
+        """From the half-spaces near x on, until the answer is beyond none."""
         price = dearer * PRICE * len(problem.free) if self.slack else None
         around, self._last = Restriction(problem, x), Quadratic(problem, price)
-        more, parts = self._first(around, x, deadline), list[HalfSpaces]()
-        for _ in range(PROGRAMS):
-            parts.append(more)
-            self._last.add(around.rows(more))
-            answer = self._last.solved(tolerance, deadline)
+        cuts, programs = self._first(around, x, deadline), 0
+        while programs < PROGRAMS:
+            programs += 1
+            answer = self._last.solved(around.rows(cuts), tolerance, deadline)
+            duals = answer.duals[len(answer.duals) - len(cuts.element) :]
+            pressing = cuts.those(duals > PRESSED * duals.max(initial=0.0))
             if not np.isfinite(answer.positions).all() or deadline.passed:
                 break
-            more = around.beyond(answer.positions, CLOSE * tolerance, self._last.slack)
+            slack = self._last.slack
+            more = around.beyond(answer.positions, max(CLOSE * tolerance, ROUGHLY * slack), slack)
             if len(more.element) == 0:
                 break
-        cuts = HalfSpaces.of(parts)
-        duals = answer.duals[len(answer.duals) - len(cuts.element) :]
-        self._kept = deadline, cuts.those(duals > PRESSED * duals.max(initial=0.0))
-        return replace(answer, programs=len(parts))
+            cuts = HalfSpaces.of([pressing, more])
+        self._kept = deadline, pressing
+        return replace(answer, programs=programs)
 
     def residual(self, problem: Problem, x: FloatArray, duals: FloatArray) -> float:
         """Of the KKT conditions at x with the duals of the last answer."""

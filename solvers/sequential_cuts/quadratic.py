@@ -43,10 +43,31 @@ class Quadratic:
         self._q, self._loose = np.zeros(len(unknowns)), price is not None
         if price is not None:
             self._q = np.append(self._q, price)
-        self._rows, self._constants = self._fixed()
+        self._fixed = self._rows_of_planes()
 
-    def add(self, cuts: Rows) -> None:
-        """Further half-spaces."""
+    def solved(self, cuts: Rows, tolerance: float, deadline: Clock) -> Answer:
+        """One interior-point run within these and what is fixed."""
+        problem, P, (fixed, constants) = self._problem, self._P, self._fixed
+        rows, of_cuts = self._rows_of(cuts)
+        self._rows, b = sp.vstack([fixed, rows], format="csc"), np.append(constants, of_cuts)
+        if self._loose:
+            P = sp.block_diag([P, sp.csc_array((1, 1))], format="csc")
+        gap = tolerance * least_gap(problem, self._scale)
+        options = settings(gap, deadline, feasibility=gap)
+        options.equilibrate_enable = True  # without, it ends of insufficient progress at times
+        cones = [clarabel.NonnegativeConeT(len(b))] if len(b) else []
+        P, rows = sp.csc_matrix(sp.triu(P)), sp.csc_matrix(self._rows)
+        found = clarabel.DefaultSolver(P, self._q, rows, b, cones, options).solve()
+        z, status = np.array(found.x), str(found.status)
+        positions: FloatArray = problem.target.copy()
+        positions[problem.free] += self._unit * z[: len(z) - self._loose].reshape(-1, 3)
+        if "Infeasible" in status:
+            positions[:] = np.nan
+        self.slack = max(0.0, float(z[-1])) if self._loose else 0.0
+        return Answer(positions, np.array(found.z), status)
+
+    def _rows_of(self, cuts: Rows) -> tuple[sp.csr_array, FloatArray]:
+        """Rows and constants of half-spaces."""
         q, target = len(cuts.offsets), self._problem.target
         columns = self._place[3 * cuts.vertices[:, :, None] + np.arange(3)]
         kept = np.nonzero(columns >= 0)
@@ -56,32 +77,7 @@ class Quadratic:
             column = np.append(column, np.full(q, len(self._q) - 1))
         rows = sp.csr_array((values, (row, column)), shape=(q, len(self._q)))
         at_target = np.einsum("qkc,qkc->q", cuts.coefficients, target[cuts.vertices])
-        self._rows = sp.vstack([self._rows, rows], format="csr")
-        self._constants = np.append(self._constants, at_target - cuts.offsets)
-
-    def solved(self, tolerance: float, deadline: Clock) -> Answer:
-        """One interior-point run."""
-        problem, P, count = self._problem, self._P, len(self._constants)
-        if self._loose:
-            P = sp.block_diag([P, sp.csc_array((1, 1))], format="csc")
-        gap = tolerance * least_gap(problem, self._scale)
-        options = settings(gap, deadline, feasibility=gap)
-        options.equilibrate_enable = True  # without, it ends of insufficient progress at times
-        found = clarabel.DefaultSolver(
-            sp.csc_matrix(sp.triu(P)),
-            self._q,
-            sp.csc_matrix(self._rows),
-            self._constants,
-            [clarabel.NonnegativeConeT(count)] if count else [],
-            options,
-        ).solve()
-        z, status = np.array(found.x), str(found.status)
-        positions: FloatArray = problem.target.copy()
-        positions[problem.free] += self._unit * z[: P.shape[0] - self._loose].reshape(-1, 3)
-        if "Infeasible" in status:
-            positions[:] = np.nan
-        self.slack = max(0.0, float(z[-1])) if self._loose else 0.0
-        return Answer(positions, np.array(found.z), status)
+        return rows, at_target - cuts.offsets
 
     def residual(self, x: FloatArray, duals: FloatArray) -> float:
         """Of the KKT conditions at x with these duals, relative to the move from the target."""
@@ -92,7 +88,7 @@ class Quadratic:
         floor = float(np.sqrt(2 * self._scale * problem.objective_floor))
         return float(np.sqrt(left @ scipy.sparse.linalg.spsolve(P, left))) / max(size, floor)
 
-    def _fixed(self) -> tuple[sp.csr_array, FloatArray]:
+    def _rows_of_planes(self) -> tuple[sp.csr_array, FloatArray]:
         """Rows and constants of vertices on each plane, in edges, and of t."""
         problem, width = self._problem, len(self._q)
         touching = np.intersect1d(problem.used, problem.free)
