@@ -3,7 +3,8 @@
 S. Kovalsky, N. Aigerman, R. Basri, Y. Lipman, "Controlling singular values with semidefinite
 programming", ACM Trans. Graph. 33(4), 2014. Lower bounds on stretch are not convex. At positions
 x_k within the limits they are replaced by convex ones that are stricter and touch them at x_k
-(`solvers.sequential_cuts.cuts`); the projection under these, a cone program, is x_{k+1}.
+(`solvers.sequential_cuts.cuts`); the projection under these, a cone program, is x_{k+1}. Isotropic
+limits on principal stretches have convex ones of their own (`solvers.sequential_cuts.halfspaces`).
 
 x_k is itself admissible to that program, so that the objective never rises, and every iterate is
 within the limits. Restrictions and limits have the same gradients at x_k: where the positions
@@ -40,9 +41,8 @@ class SequentialCuts(Solver):
     begins has that as its first start, and no other where that comes within the limits.
 
     Of limits on principal stretches it takes isotropic ones, in any metric, beside planes without
-    friction. Its restriction of these (`solvers.sequential_cuts.halfspaces`) takes several programs
-    a round, which `iterations` counts. A round is kept if it is within the limits, to the
-    tolerance, and gains.
+    friction, and counts the programs, several a round, as iterations. A round is kept if it is
+    within the limits, to the tolerance, and gains.
 
     | status | when |
     |---|---|
@@ -53,8 +53,8 @@ class SequentialCuts(Solver):
     | no start within the limits | nothing within them was found; perhaps there is nothing |
 
     Details: `rounds` of the answer, `starts` that came within the limits, and `stationarity`, the
-    answer's own KKT residual with the multipliers of its last round. Without lower bounds there is
-    one round, and the answer is the optimum.
+    answer's own KKT residual with the multipliers of its last round. Without lower bounds on stretch
+    there is one round, and the answer is the optimum.
 
     Parameters
     ----------

@@ -18,7 +18,9 @@ from strainbench.arrays import FloatArray
 PROGRAMS = 60
 """At most, of one restriction."""
 CLOSE = 1e-3
-"""How far beyond a restriction its answer may be, over the tolerance."""
+"""How far beyond a restriction its answer may be, over the tolerance. In the first steps of 20 ms
+of a beam of 200 tetrahedra the referee's residual is then 6e-5 to 7e-4; with 1e-2 up to 3e-3, and
+with 1e-4 1e-5 to 2e-4, for half as many programs again."""
 ROUGHLY = 0.1
 """The same over the slack, while there is any: x_k is to be renewed anyway."""
 PRESSED = 1e-6
