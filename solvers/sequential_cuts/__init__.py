@@ -53,8 +53,8 @@ class SequentialCuts(Solver):
     | no start within the limits | nothing within them was found; perhaps there is nothing |
 
     Details: `rounds` of the answer, `starts` that came within the limits, and `stationarity`, the
-    answer's own KKT residual with the multipliers of its last round. Without lower bounds on stretch
-    there is one round, and the answer is the optimum.
+    answer's own KKT residual with the multipliers of its last round. Without lower bounds on
+    stretch there is one round, and the answer is the optimum.
 
     Parameters
     ----------
