@@ -3,7 +3,8 @@
 S. Kovalsky, N. Aigerman, R. Basri, Y. Lipman, "Controlling singular values with semidefinite
 programming", ACM Trans. Graph. 33(4), 2014. Lower bounds on stretch are not convex. At positions
 x_k within the limits they are replaced by convex ones that are stricter and touch them at x_k
-(`solvers.sequential_cuts.cuts`); the projection under these, a cone program, is x_{k+1}.
+(`solvers.sequential_cuts.cuts`); the projection under these, a cone program, is x_{k+1}. Isotropic
+limits on principal stretches have convex ones of their own (`solvers.sequential_cuts.halfspaces`).
 
 x_k is itself admissible to that program, so that the objective never rises, and every iterate is
 within the limits. Restrictions and limits have the same gradients at x_k: where the positions
@@ -19,11 +20,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from solvers.sequential_cuts.cuts import RESTRICTIONS
-from solvers.sequential_cuts.program import Program
+from solvers.sequential_cuts.principal import PrincipalProgram
+from solvers.sequential_cuts.program import Program, Restricted
 from solvers.sequential_cuts.rounds import Limit, Run
-from solvers.sequential_cuts.starts import STARTS, candidate, rest
+from solvers.sequential_cuts.starts import STARTS, begun, candidate, rest
 from strainbench import Clock, Problem, Solution, Solver
 from strainbench.arrays import FloatArray
+from strainbench.problem.principal import PrincipalLimits
 from strainbench.solver.claim import claimed
 from strainbench.solver.solver import held_still
 
@@ -34,7 +37,12 @@ class SequentialCuts(Solver):
 
     Of several starts the answer with the least objective. A start that is not within the limits is
     brought there first: the same programs with one slack on all lower bounds, at a price. Where no
-    start gets there the rest shape, moved rigidly, is the last.
+    start gets there the rest shape, moved rigidly, is the last. A problem that says where its step
+    begins has that as its first start, and no other where that comes within the limits.
+
+    Of limits on principal stretches it takes isotropic ones, in any metric, beside planes without
+    friction, and counts the programs, several a round, as iterations. A round is kept if it is
+    within the limits, to the tolerance, and gains.
 
     | status | when |
     |---|---|
@@ -45,8 +53,8 @@ class SequentialCuts(Solver):
     | no start within the limits | nothing within them was found; perhaps there is nothing |
 
     Details: `rounds` of the answer, `starts` that came within the limits, and `stationarity`, the
-    answer's own KKT residual with the multipliers of its last round. Without lower bounds there is
-    one round, and the answer is the optimum.
+    answer's own KKT residual with the multipliers of its last round. Without lower bounds on
+    stretch there is one round, and the answer is the optimum.
 
     Parameters
     ----------
@@ -62,6 +70,9 @@ class SequentialCuts(Solver):
 
     name = "sequential-cuts"
     takes_lower = True
+    takes_principal = True
+    takes_metric = True
+    takes_contact = True
     variants = {"polar": {"restriction": "polar"}}
 
     restriction: str = "rows"
@@ -80,10 +91,26 @@ class SequentialCuts(Solver):
             raise ValueError(f"max_rounds is {self.max_rounds}: a number above 0 is valid")
 
     def supports(self, problem: Problem) -> str | None:
-        """The polar restriction bounds both principal stretches of triangles alike."""
-        refusal = super().supports(problem)
-        if refusal or problem.convex or self.restriction == "rows":
+        """A reason by kind: of limits on stretch, or on principal ones."""
+        if refusal := super().supports(problem):
             return refusal
+        kind = problem.kind
+        if not isinstance(kind, PrincipalLimits):
+            return self._supports_stretch(problem)
+        if kind.name != "isotropic":
+            return f"it cuts singular values: {kind.name} limits depend on their axes too"
+        if self.restriction != "rows":
+            return "restriction=polar is that of limits on stretch: rows is valid"
+        return None
+
+    def _supports_stretch(self, problem: Problem) -> str | None:
+        """The polar restriction bounds both principal stretches of triangles alike."""
+        if problem.metric is not None:
+            return "under limits on stretch it projects in norms of masses alone"
+        if problem.contact:
+            return "under limits on stretch it has no rows for contact with planes"
+        if problem.convex or self.restriction == "rows":
+            return None
         if problem.rest.shape[-1] != 2:
             return "restriction=polar is that of triangles: rows is valid"
         lower = problem.lower_bounds.reshape(len(problem.elements), -1)
@@ -93,6 +120,8 @@ class SequentialCuts(Solver):
 
     def prepare(self, problem: Problem) -> State:
         """The programs' patterns, and what is kept from frame to frame."""
+        if isinstance(problem.kind, PrincipalLimits):
+            return State(PrincipalProgram(slack=False), PrincipalProgram(slack=True))
         cuts = RESTRICTIONS[self.restriction](problem)
         return State(
             Program(problem, cuts, slack=False),
@@ -112,6 +141,8 @@ class SequentialCuts(Solver):
         if len(problem.free) == 0:
             return held_still(problem, tolerance)
         run = Run(problem, Limit(tolerance, self.max_rounds, deadline, monitor))
+        if isinstance(problem.kind, PrincipalLimits) and run.within(problem.target):
+            return Solution(problem.target.copy(), "solved", 0, details={"unconverged": 0.0})
         if state.repair is not None:
             return state.keep(self._best(run, state, state.repair), self.warm)
         if (last := state.serving(run)) is not None:
@@ -120,7 +151,7 @@ class SequentialCuts(Solver):
                 return again
         return state.keep(claimed(problem, run.optimum(state.program), tolerance), self.warm)
 
-    def _best(self, run: Run, state: State, repair: Program) -> Solution:
+    def _best(self, run: Run, state: State, repair: Restricted) -> Solution:
         """The least objective of all starts that come within the limits."""
         problem, found, lost = run.problem, [], []
         for start in self._starts(run, state):
@@ -132,16 +163,21 @@ class SequentialCuts(Solver):
             if run.limit.deadline.passed:
                 break
         if not found:
-            return replace(lost[0], iterations=run.count)
+            return replace(lost[0], iterations=run.count, details={"unconverged": 1.0})
         best = min(found, key=lambda solution: problem.objective(solution.positions))
-        details = {**best.details, "starts": float(len(found))}
+        unconverged = float(best.status != "solved")
+        details = {**best.details, "starts": float(len(found)), "unconverged": unconverged}
         return replace(best, iterations=run.count, details=details)
 
     def _starts(self, run: Run, state: State) -> Iterator[FloatArray]:
-        """Where to begin: at the last answer alone, where it serves; in need at the rest shape."""
+        """The last answer alone, or the step's begin, if these serve; the rest shape in need."""
         if (last := state.serving(run)) is not None:
             yield last.positions
             return
+        if (start := begun(run.problem)) is not None:
+            yield start
+            if run.descents:
+                return
         for name in self.starts:
             if (start := STARTS[name](run.problem)) is not None:
                 yield start
@@ -153,7 +189,7 @@ class SequentialCuts(Solver):
 class State:
     """The programs of a mesh, and the last answer where starts are warm."""
 
-    def __init__(self, program: Program, repair: Program | None) -> None:
+    def __init__(self, program: Restricted, repair: Restricted | None) -> None:
         self.program, self.repair = program, repair
         self.last: Solution | None = None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -29,11 +29,27 @@ the lower bounds' multipliers, which grows with the mesh. On stretch-square at 6
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a round found: positions (n, 3), and the duals of the cones' entries."""
+    """What a round found: positions (n, 3), duals of the cones' entries; in so many programs."""
 
     positions: FloatArray
     duals: FloatArray
     status: str
+    programs: int = 1
+
+
+class Restricted(Protocol):
+    """The projection within a restriction that touches at positions x (n, 3)."""
+
+    def solve(
+        self, problem: Problem, x: FloatArray, tolerance: float, deadline: Clock, dearer: float = 1
+    ) -> Answer:
+        """Of the restriction at x, slack being so many times dearer."""
+
+    def residual(self, problem: Problem, x: FloatArray, duals: FloatArray) -> float:
+        """Of the KKT conditions at x with these duals, relative to the move from the target."""
+
+    def multipliers(self, x: FloatArray, duals: FloatArray) -> FloatArray | None:
+        """(rows, 3) of rows of G, where the duals are of such."""
 
 
 class Program:
@@ -80,11 +96,12 @@ class Program:
         self.touch(x)
         q = np.append(self.q[:-1], dearer * self.q[-1]) if self.slack else self.q
         b = self._constants(problem)
-        settings = self._settings(tolerance * self._least_gap(problem), deadline)
+        gap = tolerance * least_gap(problem, self.form.scale)
+        chosen = settings(gap, deadline, feasibility=100 * gap)
         if self._solver is None:
-            self._solver = clarabel.DefaultSolver(self.P, q, self.A, b, self.cones, settings)
+            self._solver = clarabel.DefaultSolver(self.P, q, self.A, b, self.cones, chosen)
         else:
-            self._solver.update(q=q, A=self.A, b=b, settings=settings)
+            self._solver.update(q=q, A=self.A, b=b, settings=chosen)
         found = self._solver.solve()
         z = np.array(found.x)
         positions = self.form.positions(problem, z[:-1] if self.slack else z)
@@ -123,15 +140,19 @@ class Program:
         lower = at_target - self.cuts.offsets
         return np.concatenate([self.form.constants(problem), lower, np.zeros(int(self.slack))])
 
-    def _least_gap(self, problem: Problem) -> float:
-        return ACCURACY * min(1.0, self.form.scale * problem.objective_floor)
 
-    def _settings(self, gap: float, deadline: Clock) -> Any:
-        s = clarabel.DefaultSettings()
-        s.verbose, s.max_threads, s.equilibrate_enable = False, 1, False
-        s.presolve_enable = s.chordal_decomposition_enable = False
-        s.direct_solve_method = "faer"
-        s.time_limit = max(deadline.remaining, 1e-3)
-        s.tol_gap_abs = s.tol_gap_rel = gap
-        s.tol_feas = 100 * gap
-        return s
+def least_gap(problem: Problem, scale: float) -> float:
+    """Of a scaled objective, what a tolerance of 1 amounts to for Clarabel."""
+    return ACCURACY * min(1.0, scale * problem.objective_floor)
+
+
+def settings(gap: float, deadline: Clock, feasibility: float) -> Any:
+    """Clarabel's, without what it would do to a scaled program."""
+    s = clarabel.DefaultSettings()
+    s.verbose, s.max_threads, s.equilibrate_enable = False, 1, False
+    s.presolve_enable = s.chordal_decomposition_enable = False
+    s.direct_solve_method = "faer"
+    s.time_limit = max(deadline.remaining, 1e-3)
+    s.tol_gap_abs = s.tol_gap_rel = gap
+    s.tol_feas = feasibility
+    return s

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solvers.sequential_cuts.program import Answer, Program
+from solvers.sequential_cuts.program import Answer, Restricted
 from strainbench import Clock, Problem, Solution, section
 from strainbench.arrays import FloatArray
+from strainbench.problem.contact import depths
 
 STILL = 1e-5
 """Largest move of a coordinate, in edges, after which positions rest."""
@@ -30,23 +31,25 @@ class Limit:
 
 
 class Run:
-    """One projection; `count` is of its rounds so far, `descents` of starts within the limits."""
+    """One projection; `count` is of its programs so far, `descents` of starts within the limits."""
 
     def __init__(self, problem: Problem, limit: Limit) -> None:
         self.problem, self.limit = problem, limit
         self.count, self.descents, self._least = 0, 0, np.inf
 
     def within(self, x: FloatArray) -> bool:
-        """Whether the limits hold at x, pins included."""
-        return bool(self.problem.violations(x).max() <= self.limit.tolerance)
+        """Whether the limits hold at x, pins included, and planes in edges."""
+        problem, tolerance = self.problem, self.limit.tolerance
+        deep = depths(problem.contact, x[problem.used]) / problem.edge_length
+        return bool(max(problem.violations(x).max(), deep.max(initial=0.0)) <= tolerance)
 
-    def optimum(self, program: Program) -> Solution:
+    def optimum(self, program: Restricted) -> Solution:
         """Of a convex problem, by its one program."""
         answer = self._round(program, self.problem.target)
         status = "solved" if "Solved" in answer.status else answer.status
         return self._solution(program, answer.positions, answer, status, 1)
 
-    def repaired(self, repair: Program, x: FloatArray) -> tuple[FloatArray, str]:
+    def repaired(self, repair: Restricted, x: FloatArray) -> tuple[FloatArray, str]:
         """Positions within the limits, and ""; or the last on the way there, and what ended it."""
         for k in range(REPAIRS):
             if self.within(x):
@@ -61,7 +64,7 @@ class Run:
                 return x, "" if self.within(x) else "time limit"
         return x, "" if self.within(x) else "no start within the limits"
 
-    def descent(self, program: Program, x: FloatArray) -> Solution:
+    def descent(self, program: Restricted, x: FloatArray) -> Solution:
         """From x within the limits to where positions rest; each round is kept if it gains."""
         self.descents += 1
         objective, rounds, status = self.problem.objective(x), 0, "iteration limit"
@@ -81,18 +84,19 @@ class Run:
                 break
         return self._solution(program, x, answer, status, rounds)
 
-    def _ending(self, program: Program, x: FloatArray, answer: Answer, still: bool) -> str:
+    def _ending(self, program: Restricted, x: FloatArray, answer: Answer, still: bool) -> str:
         if answer.status == "MaxTime":  # its duals are no multipliers yet
             return "time limit"
         if still or program.residual(self.problem, x, answer.duals) <= STATIONARY:
             return "solved"
         return "time limit" if self.limit.deadline.passed else "stalled"
 
-    def _round(self, program: Program, x: FloatArray, dearer: float = 1) -> Answer:
-        self.count += 1
+    def _round(self, program: Restricted, x: FloatArray, dearer: float = 1) -> Answer:
         tolerance, deadline = self.limit.tolerance, self.limit.deadline
         with section("Clarabel"):
-            return program.solve(self.problem, x, tolerance, deadline, dearer)
+            answer = program.solve(self.problem, x, tolerance, deadline, dearer)
+        self.count += answer.programs
+        return answer
 
     def _show(self, x: FloatArray, objective: float) -> None:
         """To whoever watches, if nothing better was shown."""
@@ -101,7 +105,7 @@ class Run:
             self.limit.monitor(x, iterations=self.count)
 
     def _solution(
-        self, program: Program, x: FloatArray, answer: Answer, status: str, rounds: int
+        self, program: Restricted, x: FloatArray, answer: Answer, status: str, rounds: int
     ) -> Solution:
         details = {
             "rounds": float(rounds),

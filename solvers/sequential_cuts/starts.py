@@ -9,12 +9,22 @@ import numpy as np
 from strainbench import Problem
 from strainbench.arrays import FloatArray
 from strainbench.problem.elements import rest_corners
+from strainbench.problem.principal import PrincipalLimits
 
 NOISE = 0.01
 """Of starts, out of plane, in edges: a flat sheet does not buckle by itself."""
 LOST = 1e-3
 """Stretch below which a direction has collapsed, and noise in edges that gives it one again."""
 SEED = 0
+
+
+def begun(problem: Problem) -> FloatArray | None:
+    """Where the step begins, with the pins where they must be; None where the problem has none."""
+    if problem.linearise_at is None:
+        return None
+    x: FloatArray = problem.linearise_at.copy()
+    x[problem.held] = problem.target[problem.held]
+    return x
 
 
 def candidate(problem: Problem) -> FloatArray:
@@ -27,6 +37,8 @@ def rest(problem: Problem) -> FloatArray | None:
     if problem.rest.ndim == 3:
         return None
     along, _, axes = _fitted(problem)
+    if len(axes) == 3 and np.linalg.det(problem.deformation_gradients(along @ axes)[0]) < 0:
+        axes[2] *= -1  # a volume is not mirrored
     return _noisy(problem, _placed(problem, along @ axes))
 
 
@@ -38,13 +50,20 @@ def accordion(problem: Problem) -> FloatArray | None:
     if problem.rest.ndim == 3 or problem.rest.shape[1] != 2 or not _flat(problem):
         return None
     along, (_, part), axes = _fitted(problem)
-    if part >= problem.lower_bounds.min():
+    if part >= _least(problem):
         return None
     fold = _fold(problem)
     place = (along[:, 1] - along[problem.used, 1].min()) / fold
     height = np.sqrt(1 - part**2) * fold * np.abs(place % 2 - 1)
     along[:, 1] *= part
     return _placed(problem, along @ axes + np.outer(height, np.cross(*axes)))
+
+
+def _least(problem: Problem) -> float:
+    """The least stretch that a limit allows; 0 without lower limits."""
+    if isinstance(problem.kind, PrincipalLimits):
+        return float(np.nan_to_num(problem.kind.lower_limits.min()))
+    return float(problem.lower_bounds.min())
 
 
 def _flat(problem: Problem) -> bool:
@@ -87,7 +106,8 @@ def _noisy(problem: Problem, x: FloatArray) -> FloatArray:
     rng = np.random.default_rng(SEED)
     normal, other = rng.normal(size=(len(x), 1)), rng.normal(size=x.shape)
     collapsed = np.zeros((len(x), 1))
-    collapsed[problem.row_vertices[problem.stretches(x) < LOST]] = 1.0
+    lengths = np.linalg.norm(problem.G @ x, axis=1)
+    collapsed[problem.row_vertices[lengths < LOST]] = 1.0
     noise = NOISE * normal * _normals(problem, x) + LOST * collapsed * other
     noise[problem.held] = 0.0
     noisy: FloatArray = x + problem.edge_length * noise

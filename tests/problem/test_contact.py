@@ -59,14 +59,16 @@ def test_contact_with_anything_else_is_named():
 def test_solvers_say_what_they_do_not_take(name):
     limits = (
         WIDE
-        if name.startswith(("lcp", "none", "ipopt-principal"))
+        if name.startswith(("lcp", "none", "ipopt-principal", "sequential-cuts"))
         else StretchLimits(np.eye(3), np.ones(3))
     )
     solver, rough = find_solver(name), replace(FLOOR, friction=0.1)
     plain, rubbing = (solver.supports(pushed([0, 0, 0], p, limits)) for p in (FLOOR, rough))
-    if name == "ipopt-principal":
+    if name in ("ipopt-principal", "sequential-cuts"):
         assert plain is None
         assert rubbing.startswith("it has no friction")
+    elif name == "sequential-cuts-polar":
+        assert "limits on stretch" in plain
     elif name.startswith(("lcp-pgs", "none")):
         assert plain is rubbing is None or "Biot" in plain
     elif name.startswith("lcp-qp"):

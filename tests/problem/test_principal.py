@@ -288,7 +288,7 @@ def test_tightened_limits_leave_a_margin():
     assert v.max() == pytest.approx(0.16)
 
 
-TAKERS = ("none", "lcp-pgs", "lcp-qp", "ipopt-principal", "gauss-seidel-clamp")
+TAKERS = ("none", "lcp-pgs", "lcp-qp", "ipopt-principal", "gauss-seidel-clamp", "sequential-cuts")
 
 
 @pytest.mark.parametrize("name", [e.name for e in list_solvers() if not e.unavailable])

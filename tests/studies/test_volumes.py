@@ -152,6 +152,20 @@ def test_equal_singular_values_are_no_end(material):
     assert row.worst < 0.2 * free.worst
 
 
+def test_cuts_end_a_collapse_within_the_limits_at_once():
+    (row,) = repeated.came("a point, F = 0", "isotropic", "sequential-cuts")
+    assert (row.steps, row.inverted, row.upright) == (repeated.STEPS, 0, 1)
+    assert row.worst <= 1e-6
+
+
+def test_methods_stand_beside_limits_that_they_take():
+    pairs = {cell[:2] for cell in violation.cells(Plan())}
+    assert {m for m, s in pairs if s == "sequential-cuts"} == {"isotropic"}
+    pairs = {cell[1:] for cell in repeated.cells(Plan())}
+    assert {m for m, s in pairs if s == "sequential-cuts"} == {"isotropic"}
+    assert {m for m, s in pairs if s == "lcp-qp"} == set(repeated.MATERIALS)
+
+
 def test_growth_counts_what_a_mesh_takes(monkeypatch):
     monkeypatch.setattr(growth, "METHODS", ("none", "lcp-qp"))
     alone, limited = growth.stepped(2)

@@ -20,6 +20,8 @@ CELLS = (
     ("anisotropic", 5e3, "lcp-qp", 20.0, 2.0),
     ("anisotropic", 5e3, "lcp-qp", 10.0, 2.0),
     ("isotropic", 5e3, "lcp-qp", 20.0, 2.0),
+    ("isotropic", 5e3, "sequential-cuts", 20.0, 2.0),
+    ("isotropic", 5e3, "sequential-cuts", 10.0, 2.0),
     ("stiff", 4e6, "none", 20.0, 2.0),
     ("stiff", 4e6, "none", 5.0, 2.0),
 )
