@@ -39,8 +39,8 @@ def map_chart(found: Map, method: str, target: Target) -> Chart:
     cell = min(LARGEST, (sizes.width - sizes.left) / columns)
     axis = {"labelFontSize": sizes.text, "titleFontSize": sizes.title, "labelOverlap": "greedy"}
     axis |= {"labelFont": FONT, "titleFont": FONT, "ticks": False, "domain": False}
-    x: dict[str, Any] = {"field": "x", "type": "ordinal", "sort": list(found.x.shown)}
-    y: dict[str, Any] = {"field": "y", "type": "ordinal", "sort": list(reversed(found.y.shown))}
+    x: dict[str, Any] = {"field": "x", "type": "ordinal", "scale": {"domain": found.x.shown}}
+    y: dict[str, Any] = {"field": "y", "type": "ordinal", "scale": {"domain": found.y.shown[::-1]}}
     x["axis"] = axis | {"title": found.x.title, "labelAngle": -45}
     y["axis"] = axis | {"title": found.y.title}
     colours = {"domain": list(FILLS), "range": list(FILLS.values())}
