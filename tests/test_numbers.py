@@ -13,6 +13,8 @@ from tests.findings import RESULTS, ROOT, Finding, findings, precision, stands
 TEXTS = {"README.md": 0.75, "results/README.md": 0.5}
 """Of how many numbers an alteration by hand is found out, at least."""
 SOME = 50
+HELD = RESULTS / "paper"
+"""Line by line the same as its record: tests/test_readme.py."""
 
 
 @cache
@@ -44,7 +46,8 @@ def test_every_number_that_was_found_stands_in_a_record(name):
 @pytest.mark.parametrize("name", TEXTS)
 def test_most_numbers_that_are_altered_by_hand_are_found_out(name):
     rng = random.Random(0)
-    wrong = [altered(f, rng) for f in told(name)]
+    free = [f for f in told(name) if HELD not in f.sources]
+    wrong = [altered(f, rng) for f in free]
     assert sum(not f.found for f in wrong) >= TEXTS[name] * len(wrong)
 
 

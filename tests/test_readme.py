@@ -93,6 +93,18 @@ def test_example_table_is_short_and_stands_in_the_report(tmp_path, monkeypatch):
         assert line in written
 
 
+def test_the_papers_table_is_that_of_its_record():
+    def rows(text):
+        split = (line.strip("|").split("|") for line in text.splitlines() if line.startswith("|"))
+        return [tuple(cell.strip() for cell in cells) for cells in split]
+
+    record = rows((ROOT / "results/paper/table1-paper.md").read_text(encoding="utf-8"))
+    told = rows(README.partition("## Table 1 of the paper\n")[2].partition("\n## ")[0])
+    told = [row for row in told if row[1] not in ("method", "---")]
+    assert len(told) == 2 * (7 + 4)
+    assert not set(told) - set(record)
+
+
 def test_the_table_of_results_is_what_the_committed_rows_come_to():
     from strainbench.document.writers import markdown
     from strainbench.report import load_runs

@@ -115,16 +115,21 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
     asked, done = (0 if pd.isna(run[name]) else int(run[name]) for name in STEPS)
     if run["outcome"] in COUNT:
         return Finish(run["outcome"], done, asked)
-    said = zip(steps["step"], steps["outcome"], steps["status"], strict=True)
-    failed = [(step, status) for step, outcome, status in said if outcome not in COUNT]
-    cut_off = [step for step, status in failed if by_clock(status)]
+    said = list(zip(steps["step"], steps["outcome"], steps["status"], strict=True))
+    failed = {step for step, outcome, _ in said if outcome not in COUNT}
+    cut_off = {step for step, _, status in said if _cut_off(status)}
     ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
-    if ended or (run["outcome"] != NO_ANSWER and 0 < len(cut_off) == len(failed)):
-        done = len(set(steps["step"]).difference(cut_off)) if len(steps) else done
+    if ended or (run["outcome"] != NO_ANSWER and failed and failed <= cut_off):
+        done = len(set(steps["step"]) - cut_off) if len(steps) else done
         return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
     if run["outcome"] == NO_ANSWER:
         return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
     return Finish(VIOLATED, done, asked, f"violates by {power(run['max_violation'])}")
+
+
+def _cut_off(status: str) -> bool:
+    """Whether an answer is what the clock left; MaxTime is what Clarabel calls it."""
+    return by_clock(status) or status == "MaxTime"
 
 
 def cause(reason: str) -> str:
