@@ -66,6 +66,14 @@ def test_without_anything_to_project_there_is_no_time():
             (FREE, (2, "no answer", "time limit", 9.0, 9)),
             Finish("out of time", 1, 3, "1 of 3"),
         ),
+        *(  # an answer that the clock left is none, whatever it is worth, and whoever says so
+            (
+                run("no answer", "time limit of 9 s (1 of 3 steps); it says 'x'", 1),
+                (FREE, (2, outcome, status, 9.0, 9)),
+                Finish("out of time", 1, 3, "1 of 3"),
+            )
+            for outcome, status in (("optimal", "time limit"), ("violated", "MaxTime"))
+        ),
         (run("no answer", "unavailable: x", 0), (), Finish("no answer", 0, 3, "not installed")),
         (
             run("no answer", "positions that are not finite; it says 'a' (1 of 3 steps)", 1),
