@@ -46,9 +46,10 @@ def measure_sensitivity(
     from strainbench.bench.machine import describe_machine
     from strainbench.bench.plan import plan_available
     from strainbench.bench.recording import record, recorder
-    from strainbench.bench.records import open_folder, remember_machine
+    from strainbench.bench.records import open_folder
     from strainbench.document.writers import terminal
     from strainbench.files import locked
+    from strainbench.report.provenance import remember_study
     from strainbench.studies.sensitivity import Outcome, measure
 
     cells = plan_available(scenario, solver, set_ or [], 1, tolerance, time_limit)
@@ -64,6 +65,6 @@ def measure_sensitivity(
     outcome = Outcome(title, command, {machine: facts}, found)
     console.print(terminal(outcome.table()))
     with locked(results):
-        remember_machine(results, machine, facts)
+        remember_study(results, "sensitivity", machine, facts)
     for written in outcome.write(results):
         say(f"wrote {written}")

@@ -1,8 +1,8 @@
 """Which folders of results are older than the code that they measure, and how to have them anew.
 
 `python -m strainbench.report.freshness results` prints them. Rows know the sources that
-they were measured with. Studies record packages at most: of these the checkout's history tells
-how many edits of what they measure came after them.
+they were measured with, and so do studies that keep a digest of them. Of others the checkout's
+history tells how many edits of what they measure came after them.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 from strainbench.bench.records import MACHINES, RUNS, RecordsError, read_machines
 from strainbench.report.claims.written import CLAIMS
+from strainbench.report.provenance import made_with_this_code
 from strainbench.report.versions import changed_packages, shown_runs
 from strainbench.sources import PACKAGES, TELLING
 
@@ -77,7 +78,7 @@ def age(folder: Path) -> list[str]:
         return [f"{count} of {len(rows)} cells {how}" for how, count in counts.items()]
     machines = read_machines(folder) if (folder / MACHINES).exists() else {}
     changes = dict.fromkeys(filter(None, map(changed_packages, machines.values())))
-    return [*edits(folder), *changes]
+    return [*([] if made_with_this_code(machines) else edits(folder)), *changes]
 
 
 def edits(folder: Path) -> list[str]:

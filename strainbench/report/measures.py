@@ -18,6 +18,7 @@ from strainbench.bench.ending import Ending
 from strainbench.bench.failure import by_clock
 from strainbench.report.numbers import power
 from strainbench.report.rows import Row, rows_of
+from strainbench.report.versions import NOT_INSTALLED
 
 OPTIMAL, FEASIBLE, VIOLATED = "optimal", "feasible", "violated"
 OUT_OF_TIME, NO_ANSWER = "out of time", "no answer"
@@ -33,7 +34,6 @@ ASKED = (
     *("solve_seconds_median", "solve_seconds_mean"),
 )
 """Columns of steps, and of runs, that measures are taken of."""
-NOT_INSTALLED = "not installed"
 MANY_TIMES = 1e5
 NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""

@@ -18,6 +18,7 @@ from strainbench.bench.machine import installed
 from strainbench.bench.records import Row, latest_runs, read_machines
 from strainbench.sources import ROOT, SUITE, suite_digest
 
+NOT_INSTALLED = "not installed"
 PLUGINS = ("scenario", "solver")
 SAME = (
     *("scenario", "resolution", "limit", "scenario_parameters", "solver_parameters"),
@@ -89,13 +90,16 @@ def _older_source(row: Row, now: Callable[[str, tuple[str, ...]], str]) -> str:
 
 
 def changed_packages(facts: Mapping[str, object]) -> str:
-    """How a machine's packages differ from those installed; ours is known by its sources."""
+    """How a machine's packages differ from those installed; ours is known by its sources.
+
+    What is installed in one of the two places alone makes nothing older.
+    """
     packages = facts.get("packages")
     if not isinstance(packages, Mapping):
         return ""
     now = installed(packages)
-    others = [name for name in packages if name != SUITE.name]
-    changed = [f"{n} {packages[n]} (now {now[n]})" for n in others if packages[n] != now[n]]
+    both = [n for n in packages if n != SUITE.name and NOT_INSTALLED not in (packages[n], now[n])]
+    changed = [f"{n} {packages[n]} (now {now[n]})" for n in both if packages[n] != now[n]]
     return "with " + ", ".join(changed) if changed else ""
 
 

@@ -10,6 +10,8 @@ import pytest
 from strainbench.bench.machine import PACKAGES, describe_machine, installed
 from strainbench.bench.records import RUNS, RecordsError, remember_machine
 from strainbench.report.freshness import FRESH, NO_COMMAND, age, commands, freshness, main
+from strainbench.report.provenance import CODE, _counts, code_digest, remember_study
+from strainbench.sources import SUITE
 from tests.report.test_versions import measure
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -81,6 +83,24 @@ def test_a_study_is_held_against_the_history_of_its_code(tmp_path):
         git(tmp_path, "add", "-A")
         git(tmp_path, "commit", "-qm", room)
         assert [told.split(" edits since a.csv")[0] for told in age(study)] == [str(edits)][:edits]
+
+
+def test_a_study_that_keeps_the_digest_of_what_it_measured_needs_no_history(tmp_path):
+    (tmp_path / "a.csv").write_text("a\n1\n")
+    machine, facts = describe_machine(1)
+    remember_study(tmp_path, "step", machine, facts)
+    assert age(tmp_path) == []
+    remember_machine(tmp_path, machine, facts | {CODE: {"step": code_digest("ledger")}})
+    assert age(tmp_path) == ["not known: its numbers stand in no history"]
+
+
+def test_the_digest_of_a_study_is_of_what_it_measures():
+    assert code_digest("step") != code_digest("ledger")
+    assert _counts(SUITE / "studies/step/measure.py", "step")
+    assert not _counts(SUITE / "studies/ledger/report.py", "step")
+    assert not _counts(SUITE / "report/table.py", "step")
+    assert _counts(SUITE / "bench/runner.py", "step")
+    assert _counts(SUITE.parent / "solvers/clarabel.py", "step")
 
 
 def test_packages_of_a_study_that_have_changed_are_named(tmp_path):

@@ -112,6 +112,14 @@ def test_packages_that_have_changed_are_named(tmp_path):
     assert older == f"with numpy 1.0 (now {installed(['numpy'])['numpy']})"
 
 
+def test_packages_that_only_one_of_two_places_has_make_nothing_older(tmp_path):
+    here = installed(PACKAGES)
+    there = here | {"numpy": "not installed", "no such package": "1.0"}
+    remember_machine(tmp_path, "m", describe_machine(1)[1] | {"packages": there})
+    measure(tmp_path, "none", seconds=1)
+    assert shown(tmp_path) == [("none", "1", "")]
+
+
 def test_other_settings_are_other_rows(tmp_path, mine):
     measure(tmp_path, mine, seconds=1)
     parameters = json.dumps({"sweeps": 4})

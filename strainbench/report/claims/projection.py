@@ -6,8 +6,9 @@ import numpy as np
 
 from strainbench.report.claims.claim import Finding, Verdict, at, claim
 from strainbench.report.claims.evidence import Evidence
-from strainbench.report.measures import NOT_INSTALLED, OPTIMAL, VIOLATED, length
+from strainbench.report.measures import OPTIMAL, VIOLATED, length
 from strainbench.report.numbers import power
+from strainbench.report.versions import NOT_INSTALLED
 
 FIELD, LINEARISED = "claims/field", "claims/linearised"
 FRAMES = "run swing --mode replay --frames 14-22 --set resolution=20"

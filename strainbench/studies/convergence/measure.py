@@ -26,7 +26,6 @@ from strainbench.bench.records import (
     RecordsError,
     open_folder,
     read_rows,
-    remember_machine,
     write_rows,
 )
 from strainbench.files import locked
@@ -34,6 +33,7 @@ from strainbench.problem.export import write_problem
 from strainbench.problem.problem import Problem
 from strainbench.referee.certificate import certify
 from strainbench.referee.reference import content_key, reference_of
+from strainbench.report.provenance import remember_study
 from strainbench.studies.convergence.trace import trace_cell
 
 CONVERGENCE = "convergence.csv"
@@ -122,7 +122,7 @@ def _converge(
     cells: Sequence[Cell], problem: Problem, number: int, folder: Path, memory_limit_mb: float
 ) -> Iterator[tuple[Cell, str]]:
     machine, about = describe_machine(threads=1)
-    remember_machine(folder, machine, about)
+    remember_study(folder, "convergence", machine, about)
     judged = Judged(problem, cells[0].scenario.label, number)
     facts = judged.facts | {"machine": machine}
     start = {"solver": CANDIDATE, "seconds": 0.0, "iterations": 0}

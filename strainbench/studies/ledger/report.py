@@ -10,11 +10,12 @@ import pandas as pd
 
 from strainbench.bench.cell import Cell
 from strainbench.bench.machine import describe_machine
-from strainbench.bench.records import open_folder, remember_machine
+from strainbench.bench.records import open_folder
 from strainbench.document import Column, Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
 from strainbench.progress import Track, untracked
+from strainbench.report.provenance import remember_study
 from strainbench.studies.ledger.measure import AS_IT_IS, PARTS, Row, account
 
 MODELS = (
@@ -63,7 +64,7 @@ def write_ledger(cells: Sequence[Cell], folder: Path, track: Track = untracked) 
     paths = [folder / "ledger.csv", folder / "ledger.md"]
     with locked(folder):
         rows = list(track(plays, "playing", len(cells) * (3 + len(PARTS))))
-        remember_machine(folder, name, facts)
+        remember_study(folder, "ledger", name, facts)
         table = pd.DataFrame([asdict(row) for row in rows]).convert_dtypes()
         write_whole(paths[0], csv(Table.of(table)).encode())
         write_whole(paths[1], as_markdown(rows, about).encode())

@@ -7,11 +7,12 @@ from pathlib import Path
 
 from strainbench.bench.cell import Cell
 from strainbench.bench.machine import describe_machine
-from strainbench.bench.records import open_folder, remember_machine
+from strainbench.bench.records import open_folder
 from strainbench.document import Column, Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
 from strainbench.progress import Track, untracked
+from strainbench.report.provenance import remember_study
 from strainbench.studies.ledger.enough import (
     APART,
     COARSER,
@@ -55,7 +56,7 @@ def write_enough(cell: Cell, folder: Path, track: Track = untracked) -> list[Pat
         "levels.csv": csv(tables[1]),
     }
     with locked(folder):
-        remember_machine(folder, name, facts)
+        remember_study(folder, "ledger", name, facts)
         for file, text in texts.items():
             write_whole(folder / file, text.encode())
     return [folder / file for file in texts]

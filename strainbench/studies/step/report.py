@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from strainbench.bench.machine import describe_machine
-from strainbench.bench.records import open_folder, remember_machine
+from strainbench.bench.records import open_folder
 from strainbench.document import Column, Document, Part, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
@@ -22,6 +22,7 @@ from strainbench.report.charts.canvas import about
 from strainbench.report.charts.curves import Curve, Curves, point
 from strainbench.report.machine import machine_section
 from strainbench.report.numbers import power
+from strainbench.report.provenance import remember_study
 from strainbench.studies.step.measure import Distance
 
 EXPLANATION = (
@@ -58,7 +59,7 @@ def write_distances(rows: Sequence[Distance], command: str, folder: Path) -> lis
         TIMES: csv(Table("", TIME_COLUMNS, list(_times(rows)))),
     }
     with locked(folder):
-        remember_machine(folder, name, facts)
+        remember_study(folder, "step", name, facts)
         for file, text in texts.items():
             write_whole(folder / file, text.encode())
         if found := charts(rows, Target.PAGE):
