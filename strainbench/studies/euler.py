@@ -5,12 +5,16 @@
 plays a cloth scene without projection, or with that of `--solver NAME`. Each step is solved with
 every linear solver in turn, so that they share whatever else the machine does; the first one's
 positions go on. Printed are medians over the steps: seconds a step, its split, and the ratio of the
-whole step to the assembly and factorisation in it. OMP_NUM_THREADS=1 keeps each on one core.
+whole step to the assembly and factorisation in it; `-o FILE` writes them to a .md or .csv file too.
+OMP_NUM_THREADS=1 keeps each on one core.
 """
 
 from __future__ import annotations
 
+import shlex
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 from time import perf_counter
 from typing import Annotated
@@ -20,12 +24,15 @@ import typer
 from rich.console import Console
 
 from strainbench.arrays import FloatArray
-from strainbench.document import Column, Table
+from strainbench.bench.machine import describe_machine
+from strainbench.document import Code, Column, Document, Table
 from strainbench.document.writers import terminal
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
 from strainbench.physics.integrators import Motion, Project, step_and_project
 from strainbench.physics.linear import LinearSolver, available_linear_solvers
+from strainbench.report.machine import machine_section
+from strainbench.report.output import check_ending, write_output
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.stage import Stage
@@ -128,9 +135,12 @@ def run(
     steps: Annotated[int, typer.Option(min=1)] = 20,
     step: Annotated[float, typer.Option(help="time step [s]")] = 1 / 60,
     solver: Annotated[str, typer.Option(help="of the projection; none leaves it out")] = "none",
+    output: Annotated[Path | None, typer.Option("--output", "-o")] = None,
 ) -> None:
     """Print the split of implicit Euler's time on SCENARIO."""
     try:
+        if output is not None:
+            check_ending(output)
         kind = find_scenario(name)
         if not issubclass(kind, ClothScenario):
             raise ValueError(f"{name} has no cloth that moves by implicit Euler")
@@ -141,7 +151,14 @@ def run(
     profile(small, 1)  # compiles
     measured = profile(scene, steps, project)
     title = f"{name} {resolution}x{resolution}, {steps} steps of {step:.4g} s, solver {solver}"
-    Console(width=150).print(terminal(table(measured, title)))
+    found = table(measured, title)
+    Console(width=150).print(terminal(found))
+    if output is not None:
+        machine, facts = describe_machine(threads=1)
+        command = shlex.join(["python", "-m", "strainbench.studies.euler", *sys.argv[1:]])
+        about = machine_section({machine: facts})
+        title = "Where implicit Euler's time goes"
+        write_output(output, Document(title, [Code(command), found, about]), found)
 
 
 if __name__ == "__main__":

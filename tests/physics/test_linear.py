@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -149,3 +151,18 @@ def test_a_wrong_word_to_the_profile_is_one_line(scene, step, line):
 def test_a_solver_that_the_profile_does_not_know_is_one_line():
     with pytest.raises(SystemExit, match="no solver called 'mosek'; valid are"):
         run("swing", 2, 1, 0.01, "mosek")
+
+
+def test_the_profile_writes_what_it_prints_with_its_command(tmp_path, monkeypatch, capsys):
+    path = tmp_path / "euler.md"
+    monkeypatch.setattr(sys, "argv", ["euler.py", "swing", "--resolution", "2", "-o", str(path)])
+    run("swing", 2, 1, 0.01, output=path)
+    printed, text = capsys.readouterr().out, path.read_text()
+    assert f"`python -m strainbench.studies.euler swing --resolution 2 -o {path}`" in text
+    (line,) = (line for line in text.splitlines() if line.startswith("| superlu"))
+    assert [c.strip() for c in line.split("|")] == [
+        c.strip() for row in printed.splitlines() if "superlu" in row for c in row.split("|")
+    ]
+    assert "Python" in text
+    with pytest.raises(SystemExit, match=r"-o .*x\.pdf: a name that ends in"):
+        run("swing", 2, 1, 0.01, output=tmp_path / "x.pdf")
