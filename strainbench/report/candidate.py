@@ -192,7 +192,7 @@ def _fault(
     """Why a row does not count, or ""; a violation asked for may be any."""
     end = finish(row, steps)
     if end.ending == OUT_OF_TIME:
-        return f"out of time, {end.why} steps"
+        return f"out of time, {end.done} of {end.planned} steps"
     if not end.counts and not (end.ending == VIOLATED and question.accuracy.column == VIOLATION):
         return end.why
     if not isfinite(reached):

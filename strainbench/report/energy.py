@@ -10,6 +10,7 @@ import pandas as pd
 
 from strainbench.arrays import FloatArray
 from strainbench.document import Column, Prose, Table
+from strainbench.report.measures import OUT_OF_TIME
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits, settings
 from strainbench.report.rows import Row, rows_of
 from strainbench.report.steps import newest_steps
@@ -30,15 +31,14 @@ rest has a small range in its last quarter. Rises: the sum of all of them. Fluct
 square of the second difference. Turns: how often the energy begins to rise, or to fall."""
 NUMBERS = {"time": "s", "first": "mJ", "highest": "", "last": "", "range in the last quarter": ""}
 UNSTEADY = {"rises": "", "fluctuation": ""}
-"""Further such columns."""
-"""Columns with their units."""
+"""Columns with their units, and further ones."""
 ENDED = "ended after"  # in the names of runs without an answer to the end
 
 
 def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """Total energy of every step of the simulated runs, in the order of the runs.
 
-    Columns: cell, panel and curve (what tells its panel and its curve from others), time [s],
+    A step that the clock cut off is none. Columns: cell, panel and curve (what tells its panel and its curve from others), time [s],
     energy [J].
     """
     simulated = runs[runs["mode"] == "simulate"]
@@ -48,6 +48,8 @@ def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     steps = steps.dropna(subset=["time", "kinetic_energy"]).drop_duplicates(
         ["cell", "step"], keep="last"
     )
+    late = simulated[simulated["ending"] == OUT_OF_TIME].set_index("cell")["done"]
+    steps = steps[steps["step"] <= steps["cell"].map(late).fillna(np.inf)]
     names = _names(simulated)
     steps = steps.assign(order=steps["cell"].map({c: k for k, c in enumerate(names.index)}))
     steps = steps.sort_values(["order", "step"]).join(names, on="cell")
@@ -91,8 +93,8 @@ def _curve(row: Row, precision: Mapping[str, int], others: str) -> str:
 
 def ended(row: Row) -> str:
     """That a run ended early, and when; such a curve ends in a cross."""
-    early = row["steps_done"] < row["steps_asked"]
-    return f", {ENDED} {row['steps_done']:.0f} of {row['steps_asked']:.0f} steps" if early else ""
+    early = row["done"] < row["steps_asked"]
+    return f", {ENDED} {row['done']:.0f} of {row['steps_asked']:.0f} steps" if early else ""
 
 
 def energy_table(folder: Path, runs: pd.DataFrame) -> Table:

@@ -35,7 +35,7 @@ ASKED = (
 )
 """Columns of steps, and of runs, that measures are taken of."""
 MANY_TIMES = 1e5
-NEW = ("ending", "done", "why", "time", "time_low", "time_high", "time_count")
+NEW = ("ending", "done", "astray", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
 
 
@@ -60,12 +60,18 @@ class Quartiles(NamedTuple):
 
 @dataclass(frozen=True)
 class Finish:
-    """How a cell ended: one of ENDINGS, steps done of those planned, why in at most four words."""
+    """How a cell ended: one of ENDINGS, steps done of those planned, why in at most four words.
+
+    Parameters
+    ----------
+    astray : steps done of those that the clock ended that are not within the limits
+    """
 
     ending: str
     done: int
     planned: int
     why: str = ""
+    astray: int = 0
 
     @property
     def sign(self) -> str:
@@ -121,7 +127,9 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
     ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
     if ended or (run["outcome"] != NO_ANSWER and failed and failed <= cut_off):
         done = len(set(steps["step"]) - cut_off) if len(steps) else done
-        return Finish(OUT_OF_TIME, done, asked, f"{done} of {asked}")
+        astray = len({step for step, outcome, _ in said if outcome == VIOLATED} - cut_off)
+        why = f"{done} of {asked}" + (f", {astray} violated" if astray else "")
+        return Finish(OUT_OF_TIME, done, asked, why, astray)
     if run["outcome"] == NO_ANSWER:
         return Finish(NO_ANSWER, done, asked, cause(run["reason"]))
     return Finish(VIOLATED, done, asked, f"violates by {power(run['max_violation'])}")
@@ -163,7 +171,7 @@ def _measures(run: Row, steps: pd.DataFrame) -> tuple[object, ...]:
     if steps.empty:
         own = (run["solve_seconds_median"], run["solve_seconds_mean"])
         time = Quartiles.of([s for s in own if s == s][:1])._replace(n=0)
-    return (end.ending, end.done, end.why, *time)
+    return (end.ending, end.done, end.astray, end.why, *time)
 
 
 def digits(value: float, count: int = 2) -> str:

@@ -231,8 +231,9 @@ class Sheet:
 
 def failure(row: Row) -> str:
     """What went wrong in a cell, in a few words."""
-    why = str(row["why"])
-    return f"× {why} {_step(row)}s" if row["ending"] == OUT_OF_TIME else f"× {why}"
+    if row["ending"] == OUT_OF_TIME:
+        return f"× {row['done']:.0f} of {row['steps_asked']:.0f} {_step(row)}s"
+    return f"× {row['why']}"
 
 
 def _step(row: Row) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator
 from math import isfinite, nan
+from statistics import fmean
 
 import pandas as pd
 
@@ -89,7 +90,7 @@ def _tables(cells: Cells) -> list[Table]:
     """Seconds, ratios, distances; none where nothing stands beside implicit Euler."""
     if {name for name, *_ in cells} <= {"none"} or not any(name == "none" for name, *_ in cells):
         return []
-    euler = {n: cells[at]["ie_seconds_mean"] for at in cells if (n := at[2]) and at[0] == "none"}
+    euler = _euler(cells)
     theirs = dict(zip(SIZES, PAPER_SECONDS[EULER, 0.01], strict=True))
 
     def ratio(row: Row) -> str:
@@ -116,6 +117,12 @@ def _tables(cells: Cells) -> list[Table]:
             "Distance from the optimum", _header("mm"), list(_lines(cells, _away)), Prose(DISTANCES)
         ),
     ]
+
+
+def _euler(cells: Cells) -> dict[int, float]:
+    """Seconds a step of implicit Euler by size: the mean of its runs, as no limit changes them."""
+    runs = [(n, row["ie_seconds_mean"]) for (name, _, n), row in cells.items() if name == "none"]
+    return {n: fmean(seconds for size, seconds in runs if size == n) for n, _ in runs}
 
 
 def _header(unit: str = "") -> list[str | Column]:
@@ -158,8 +165,9 @@ def _marked(row: Row, value: float) -> str:
     """A number with the mark of how its cell ended."""
     if not row["done"] or not isfinite(value):
         return NONE
-    mark = {VIOLATED: "*", OUT_OF_TIME: f" ({row['done']:.0f})"}.get(row["ending"], "")
-    return digits(value, 3) + mark
+    star = "*" if row["ending"] == VIOLATED or row["astray"] > 0 else ""
+    steps = f" ({row['done']:.0f})" if row["ending"] == OUT_OF_TIME else ""
+    return digits(value, 3) + star + steps
 
 
 def _away(row: Row) -> str:

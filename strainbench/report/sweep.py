@@ -86,9 +86,9 @@ def _how(row: pd.Series, rows: pd.DataFrame) -> list[str]:
 
 
 def differs(row: pd.Series, rows: pd.DataFrame) -> list[str]:
-    """The same of all that may set it apart."""
+    """The same of all that may set it apart, but for the limit, which titles have."""
     words = [row[name] for name in ("scenario", "mode") if rows[name].nunique() > 1]
     every = [settings(text) for text in rows["rest"].unique()]
     same = [k for k in settings(row["rest"]) if len({json.dumps(e.get(k)) for e in every}) == 1]
-    words.append(describe(row["rest"], same, digits(rows["rest"])))
+    words.append(describe(row["rest"], ["limit", *same], digits(rows["rest"])))
     return [word for word in (*words, *_how(row, rows)) if word]

@@ -57,6 +57,11 @@ def test_without_anything_to_project_there_is_no_time():
         (run("violated"), (FREE, FIRST, CUT), Finish("out of time", 2, 3, "2 of 3")),
         (run("violated"), (FREE, OWN, CUT), Finish("violated", 3, 3, "violates by 3e-2")),
         (
+            run("no answer", "time limit of 9 s (2 of 3 steps)", 2),
+            (FREE, OWN, CUT),
+            Finish("out of time", 2, 3, "2 of 3, 1 violated", 1),
+        ),
+        (
             run("no answer", "time limit of 9 s (1 of 3 steps)", 1),
             (FREE,),
             Finish("out of time", 1, 3, "1 of 3"),

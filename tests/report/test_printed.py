@@ -10,7 +10,8 @@ import pytest
 from strainbench.bench.columns import RUN_COLUMNS
 from strainbench.bench.records import RUNS, append_rows
 from strainbench.report import load_runs
-from strainbench.report.printed import PAPER_SECONDS, SIZES, STARRED, printed_tables
+from strainbench.report.measures import OUT_OF_TIME
+from strainbench.report.printed import PAPER_SECONDS, SIZES, STARRED, _marked, printed_tables
 from tests.report.test_report import row
 
 
@@ -66,6 +67,23 @@ def test_marks_say_how_a_cell_ended(tables):
     assert seconds["gauss-seidel", "1%"][0] == "0.500*"
     assert away["gauss-seidel", "1%"][0] == "(by 3e-3)"
     assert seconds["ipopt-default", "1%"][0] == "-"
+
+
+def test_steps_beyond_the_limits_are_starred_though_the_clock_ended_the_cell():
+    ended = {"ending": OUT_OF_TIME, "done": 25}
+    assert _marked({**ended, "astray": 4}, 0.5) == "0.500* (25)"
+    assert _marked({**ended, "astray": 0}, 0.5) == "0.500 (25)"
+    assert _marked({"ending": OUT_OF_TIME, "done": 0, "astray": 0}, 0.5) == "-"
+
+
+def test_implicit_euler_is_the_mean_of_its_runs_which_no_limit_changes(tables):
+    seconds, ratios, _ = tables(
+        cell("none"),
+        cell("none", limit=0.1, ie_seconds_mean=0.03),
+        cell("newton-ipm", limit=0.1, solve_seconds_mean=0.02),
+    )
+    assert seconds["implicit Euler", ""][0] == "0.0200"
+    assert ratios["newton-ipm", "10%"][0] == "1.00"
 
 
 @pytest.mark.parametrize(
