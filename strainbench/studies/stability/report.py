@@ -11,7 +11,7 @@ from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.charts import Target, draw, draw_sheet
 from strainbench.report.measures import COUNT, NO_ANSWER, OPTIMAL, OUT_OF_TIME, SIGNS
-from strainbench.studies.stability.chart import map_chart
+from strainbench.studies.stability.chart import key_chart, map_chart
 from strainbench.studies.stability.measure import Map, Spot
 from strainbench.studies.stability.refine import Point
 from strainbench.studies.stability.words import FAILS, HOLDS, LATE, boundary
@@ -46,7 +46,8 @@ def write_map(found: Map, title: str, command: str, folder: Path) -> list[Path]:
             paths.append(folder / f"map-{method.replace('/', '-')}{ending}")
             draw(map_chart(found, method, target), paths[-1])
     paths.append(folder / "map.png")
-    draw_sheet([map_chart(found, m, Target.PAPER) for m in found.spots], paths[-1:], columns=4)
+    maps = [map_chart(found, method, Target.PAPER) for method in found.spots]
+    draw_sheet([*maps, key_chart(found, Target.PAPER)], paths[-1:], columns=4)
     return paths
 
 
