@@ -40,7 +40,7 @@ class Tally:
     def lines(self) -> Iterator[str]:
         """The counts as a table."""
         found = f"{len(self.contradictions)} of {self.certificates} certificates contradicted"
-        yield f"{self.problems} problems: {found}"
+        yield f"{self.problems} problems, {len(self.answers)} solvers: {found}"
         yield from self.contradictions
         width = max(map(len, self.answers), default=0)
         yield "  ".join([" " * width, *COLUMNS])

@@ -1,4 +1,4 @@
-"""The verb map: where methods stop to work, over two settings."""
+"""The verb map: where methods stop working, over two settings."""
 
 from __future__ import annotations
 
