@@ -126,8 +126,12 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
     cut_off = {step for step, _, status in said if _cut_off(status)}
     ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
     if ended or (run["outcome"] != NO_ANSWER and failed and failed <= cut_off):
-        done = len(set(steps["step"]) - cut_off) if len(steps) else done
-        astray = len({step for step, outcome, _ in said if outcome == VIOLATED} - cut_off)
+        whole = sorted(set(steps["step"]) - cut_off)[
+            : max(done, 0)
+        ]  # a last one may not say that it is cut
+        violated = {step for step, outcome, _ in said if outcome == VIOLATED}
+        done = len(whole) if len(steps) else done
+        astray = len(violated.intersection(whole))
         why = f"{done} of {asked}" + (f", {astray} violated" if astray else "")
         return Finish(OUT_OF_TIME, done, asked, why, astray)
     if run["outcome"] == NO_ANSWER:

@@ -53,7 +53,7 @@ def beyond(rows: pd.DataFrame) -> pd.Series:
 
 def beyond_text(row: pd.Series) -> str:
     """The same of one cell."""
-    return "" if pd.isna(row["beyond"]) else f"{row['beyond']:.2g}"
+    return "" if pd.isna(row["beyond"]) else f"{row['beyond']:.2g}".replace("e-0", "e-")
 
 
 def sweep_tables(runs: pd.DataFrame) -> list[Table]:

@@ -188,8 +188,11 @@ def older(runs: pd.DataFrame) -> list[str]:
 
 
 def disturbed(runs: pd.DataFrame) -> list[str]:
-    """A line for each cell that was measured beside other work."""
+    """A line for each cell that was measured beside other work, or one for all if all were."""
     beside = runs[runs["load"] > OTHER_WORK]
+    if len(beside) == len(runs) > 1:
+        low, high = beside["load"].min(), beside["load"].max()
+        return [f"all {len(runs)} cells: load {low:.1f} to {high:.1f}"]
     return [f"{scene(r)}, {r['solver']}: load {r['load']:.1f}" for r in rows_of(beside)]
 
 

@@ -114,7 +114,10 @@ def test_the_tally_counts():
     counts.refused("proud")
     counts.problem(["problem 0, a: wrong"])
     lines = list(counts.lines())
-    assert lines[:2] == ["1 problems, 2 solvers: 1 of 2 certificates contradicted", "problem 0, a: wrong"]
+    assert lines[:2] == [
+        "1 problems, 2 solvers: 1 of 2 certificates contradicted",
+        "problem 0, a: wrong",
+    ]
     assert [line.split() for line in lines[3:]] == [
         ["liar", "0", "0", "2", "0", "1", "0"],
         ["proud", "0", "0", "0", "0", "0", "1"],

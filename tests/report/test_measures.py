@@ -18,6 +18,7 @@ from strainbench.report.measures import (
     finish,
     length,
     measured,
+    numbers,
     timing,
 )
 from strainbench.report.steps import newest_steps
@@ -56,6 +57,11 @@ def test_without_anything_to_project_there_is_no_time():
         (run("optimal"), (FREE, FIRST, SECOND), Finish("optimal", 3, 3)),
         (run("violated"), (FREE, FIRST, CUT), Finish("out of time", 2, 3, "2 of 3")),
         (run("violated"), (FREE, OWN, CUT), Finish("violated", 3, 3, "violates by 3e-2")),
+        (  # SCS ends with this word at a limit of time, too
+            run("no answer", "time limit of 9 s (1 of 3 steps)", 1),
+            (FREE, (2, "violated", "optimal_inaccurate", 9.0, 9)),
+            Finish("out of time", 1, 3, "1 of 3"),
+        ),
         (
             run("no answer", "time limit of 9 s (2 of 3 steps)", 2),
             (FREE, OWN, CUT),
@@ -93,14 +99,18 @@ def test_what_the_clock_cut_off_is_out_of_time_and_no_violation(row, rows, expec
 
 def test_the_committed_field_says_who_ran_out_of_time():
     runs = load_runs(FIELD)
-    runs = measured(runs, newest_steps(FIELD, runs))
-    fine = runs[runs["resolution"] == 40].set_index("solver")
-    for name in ("cvxpy", "dykstra", "linearized-qp"):
-        assert (fine.loc[name, "ending"], fine.loc[name, "why"]) == ("out of time", "7 of 8")
-    assert fine.loc["ipopt-edges", "ending"] == "violated"
-    coarse = runs[runs["resolution"] == 20].set_index("solver")
-    assert digits(1000 * coarse.loc["newton-ipm", "time"]) == "11"
-    assert coarse.loc["newton-ipm", "time_count"] == 7
+    steps = newest_steps(FIELD, runs)
+    runs = measured(runs, steps).set_index("cell")
+    late = runs[runs["reason"].str.startswith("time limit")]
+    assert len(late)
+    assert set(late["ending"]) == {"out of time"}
+    assert (late["done"] <= late["steps_done"]).all()
+    assert [why.split(",")[0] for why in late["why"]] == [f"{n} of 8" for n in late["done"]]
+    for cell in runs.index[runs["solver"] == "newton-ipm"]:
+        own = numbers(steps[steps["cell"] == cell])
+        had = own.loc[own["active_constraints"] > 0, "seconds"]
+        assert runs.loc[cell, "time"] == pytest.approx(had.median())
+        assert runs.loc[cell, "time_count"] == len(had) == 7
 
 
 @pytest.mark.parametrize(
