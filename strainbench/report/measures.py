@@ -126,9 +126,8 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
     cut_off = {step for step, _, status in said if _cut_off(status)}
     ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
     if ended or (run["outcome"] != NO_ANSWER and failed and failed <= cut_off):
-        whole = sorted(set(steps["step"]) - cut_off)[
-            : max(done, 0)
-        ]  # a last one may not say that it is cut
+        own = sorted(set(steps["step"]) - cut_off)
+        whole = own[: max(done, 0)]  # not every solver says that it was cut off
         violated = {step for step, outcome, _ in said if outcome == VIOLATED}
         done = len(whole) if len(steps) else done
         astray = len(violated.intersection(whole))
