@@ -1,4 +1,4 @@
-"""What lies behind the points of a plane: the reference's own error, and the question asked."""
+"""What lies behind the points of a plane: the references' error, and the question asked."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from math import isfinite
 from strainbench.report.charts.canvas import BAND, SOFT, Plane
 from strainbench.report.charts.text import Box, width
 
-UNKNOWN = "below the reference's own error"
+UNKNOWN = "below the largest error of the references"
 QUESTION = "question"
 """The parameter {seconds, value} that frames what is both faster and more accurate; or null."""
 

@@ -67,7 +67,9 @@ ACCURACIES = {
 CAPTION = """\
 Time: median over the projections with active constraints, bars from the first to the third
 quartile. Filled: optimal on every step; hollow: within the limits, not optimal. Stair: what no
-method beats in both. Grey: below the reference's own error."""
+method beats in both. Grey: below the largest error of the references."""
+UNANSWERED = "no method has an answer that counts"
+UNMEASURED = "no certified optimum to measure from"
 
 
 def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance") -> list[Chart]:
@@ -160,7 +162,8 @@ class Panel:
         plane = Plane(self.target, self.title, self.x, y, rail=rail, height=height)
         if empty:
             middle = {"px": plane.width / 2, "py": height / 2, "ink": SOFT}
-            plane.texts([middle | {"text": "no method has an answer that counts"}], "center")
+            within = any(run["ending"] in COUNT for run in self.runs)
+            plane.texts([middle | {"text": UNMEASURED if within else UNANSWERED}], "center")
         if self.target.interactive:
             question(plane)
         errors = (run["reference_error_max"] for run in self.runs)
