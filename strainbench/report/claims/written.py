@@ -11,10 +11,14 @@ from strainbench.document.html import page
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.claims import (
+    bdf2,
     cost,
+    failing,
     hernandez,
     hernandez_shapes,
+    others,
     projection,
+    rest,
     scheme,
     table1,
 )
@@ -26,7 +30,18 @@ PAPERS = {
     "T": "Tang, Coros and Thomaszewski 2022",
     "H": "Hernandez, Cirio, Perez and Otaduy 2013",
 }
-MODULES = (projection, scheme, table1, cost, hernandez, hernandez_shapes)
+MODULES = (
+    projection,
+    rest,
+    scheme,
+    bdf2,
+    table1,
+    failing,
+    others,
+    cost,
+    hernandez,
+    hernandez_shapes,
+)
 """Their import registers the claims."""
 ABOUT = """\
 What the papers claim, in our words, beside what is measured here. Each verdict follows from the
