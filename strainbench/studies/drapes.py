@@ -73,7 +73,7 @@ def _surface(shape: str, resolution: int) -> FloatArray:
 def run(
     resolution: Annotated[str, typer.Option(help="cells a side, several by commas")] = "15,30",
     output: Annotated[Path, typer.Option("--output", "-o", help="folder of apart.csv")] = Path(
-        "results/claims/drapes"
+        "results/local/drapes"
     ),
 ) -> None:
     """Write the distances of the drapes of a scene's curves."""

@@ -164,18 +164,19 @@ def large_steps(seen: Evidence) -> Finding:
         Verdict.of(not rises and falls, not rises),
         f"{_risen(rises)} At 2 s, for steps of {', '.join(map(fraction, ends.index))} s: "
         f"{listed(ends)} mJ{_turns_at(ends)}.",
-        or_missing(
-            lambda: " ".join(_in_mass_norm(seen, kind) for kind in ("alternating", "uniform"))
-        ),
+        or_missing(lambda: f"In the norm of the masses: {_in_mass_norm(seen)}."),
     )
 
 
-def _in_mass_norm(seen: Evidence, diagonals: str) -> str:
-    ends, rises = _ends(seen, LARGE, norm="mass", diagonals=diagonals)
-    return (
-        f"In the norm of the masses, {diagonals} diagonals, {', '.join(map(fraction, ends.index))} "
-        f"s: {listed(ends)} mJ{_turns_at(ends)}. {_risen(rises)}"
-    )
+def _in_mass_norm(seen: Evidence) -> str:
+    told = []
+    for diagonals in ("alternating", "uniform"):
+        ends, rises = _ends(seen, LARGE, norm="mass", diagonals=diagonals)
+        told.append(
+            f"{diagonals} diagonals, {', '.join(map(fraction, ends.index))} s, {listed(ends)} mJ"
+            f"{_turns_at(ends)} ({_risen(rises).rstrip('.').lower()})"
+        )
+    return "; ".join(told)
 
 
 def _ends(seen: Evidence, folder: str, **wanted: object) -> tuple[pd.Series, list[float]]:

@@ -52,7 +52,7 @@ def tally(seen: Evidence, folder: str, **wanted: object) -> Tally:
     cell = seen.cells(folder, **wanted).tail(1)
     run = cell.iloc[0]
     steps = newest_steps(seen.root / folder, cell)
-    own = steps[[not cut_off_by_clock(status) for status in steps["status"]]]
+    own = steps[~steps["status"].map(cut_off_by_clock).astype(bool)]
     finished = own[own["outcome"] != "no answer"]
     return Tally(
         int(run["steps_asked"]),

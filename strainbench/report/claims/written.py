@@ -77,11 +77,16 @@ def audit(root: Path) -> list[tuple[Claim, Finding]]:
 
 
 def missing(root: Path) -> list[str]:
-    """The commands that claims without a verdict need, with results in `root`."""
-    unmeasured = (c for c, f in audit(root) if f.verdict is Verdict.UNMEASURED)
+    """The commands of claims that lack a verdict or numbers, with results in `root`."""
+    unmeasured = (c for c, f in audit(root) if _lacks(f))
     commands = dict.fromkeys(command for claim in unmeasured for command in claim.commands)
     place = f" {shlex.quote(str(root))}/"
     return [c.replace(" results/", place) for c in commands if c.startswith((PROGRAM, "python "))]
+
+
+def _lacks(finding: Finding) -> bool:
+    """Whether it says of anything that it is not measured yet."""
+    return Verdict.UNMEASURED in f"{finding.verdict} {finding.numbers} {finding.second}".lower()
 
 
 def counted(found: list[tuple[Claim, Finding]]) -> str:
