@@ -169,7 +169,7 @@ def _steps(seen: Evidence, folder: str, solver: str, limit: float) -> dict[int, 
     at(
         STRAIN,
         "run swing --mode replay --frames 14-18 --set resolution=10,20 --set limit=1%,10% --solver "
-        "gauss-seidel,gauss-seidel-strain --time-limit 100",
+        "gauss-seidel,gauss-seidel-strain --time-limit 200",
     ),
     fairness="They clamp entries of the strain (`gauss-seidel-strain`), here directions; both at "
     "most 1e5 sweeps, to 1e-6. What the clock ended is counted as neither.",
