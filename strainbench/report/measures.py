@@ -123,7 +123,7 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
         return Finish(run["outcome"], done, asked)
     said = list(zip(steps["step"], steps["outcome"], steps["status"], strict=True))
     failed = {step for step, outcome, _ in said if outcome not in COUNT}
-    cut_off = {step for step, _, status in said if _cut_off(status)}
+    cut_off = {step for step, _, status in said if cut_off_by_clock(status)}
     ended = Ending.of(run["reason"]) is Ending.TIME_LIMIT
     if ended or (run["outcome"] != NO_ANSWER and failed and failed <= cut_off):
         own = sorted(set(steps["step"]) - cut_off)
@@ -138,7 +138,7 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
     return Finish(VIOLATED, done, asked, f"violates by {power(run['max_violation'])}")
 
 
-def _cut_off(status: str) -> bool:
+def cut_off_by_clock(status: str) -> bool:
     """Whether an answer is what the clock left; MaxTime is what Clarabel calls it."""
     return by_clock(status) or status == "MaxTime"
 

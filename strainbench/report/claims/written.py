@@ -11,10 +11,14 @@ from strainbench.document.html import page
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.claims import (
+    bdf2,
     cost,
+    failing,
     hernandez,
     hernandez_shapes,
+    others,
     projection,
+    rest,
     scheme,
     table1,
 )
@@ -26,7 +30,18 @@ PAPERS = {
     "T": "Tang, Coros and Thomaszewski 2022",
     "H": "Hernandez, Cirio, Perez and Otaduy 2013",
 }
-MODULES = (projection, scheme, table1, cost, hernandez, hernandez_shapes)
+MODULES = (
+    projection,
+    rest,
+    scheme,
+    bdf2,
+    table1,
+    failing,
+    others,
+    cost,
+    hernandez,
+    hernandez_shapes,
+)
 """Their import registers the claims."""
 ABOUT = """\
 What the papers claim, in our words, beside what is measured here. Each verdict follows from the
@@ -62,11 +77,16 @@ def audit(root: Path) -> list[tuple[Claim, Finding]]:
 
 
 def missing(root: Path) -> list[str]:
-    """The commands that claims without a verdict need, with results in `root`."""
-    unmeasured = (c for c, f in audit(root) if f.verdict is Verdict.UNMEASURED)
+    """The commands of claims that lack a verdict or numbers, with results in `root`."""
+    unmeasured = (c for c, f in audit(root) if _lacks(f))
     commands = dict.fromkeys(command for claim in unmeasured for command in claim.commands)
     place = f" {shlex.quote(str(root))}/"
     return [c.replace(" results/", place) for c in commands if c.startswith((PROGRAM, "python "))]
+
+
+def _lacks(finding: Finding) -> bool:
+    """Whether it says of anything that it is not measured yet."""
+    return Verdict.UNMEASURED in f"{finding.verdict} {finding.numbers} {finding.second}".lower()
 
 
 def counted(found: list[tuple[Claim, Finding]]) -> str:
