@@ -14,7 +14,10 @@ from strainbench.report.claims import (
     cost,
     hernandez,
     hernandez_shapes,
+    methods,
+    motion,
     projection,
+    robustness,
     scheme,
     table1,
 )
@@ -26,7 +29,17 @@ PAPERS = {
     "T": "Tang, Coros and Thomaszewski 2022",
     "H": "Hernandez, Cirio, Perez and Otaduy 2013",
 }
-MODULES = (projection, scheme, table1, cost, hernandez, hernandez_shapes)
+MODULES = (
+    projection,
+    methods,
+    scheme,
+    table1,
+    cost,
+    robustness,
+    motion,
+    hernandez,
+    hernandez_shapes,
+)
 """Their import registers the claims."""
 ABOUT = """\
 What the papers claim, in our words, beside what is measured here. Each verdict follows from the
