@@ -161,7 +161,11 @@ def test_fast_projection_is_counted_over_cells(tmp_path):
 )
 def test_local_minima_of_edges_are_seen_by_their_objectives(tmp_path, monkeypatch, apart, verdict):
     cells = [
-        {"cell": f"{lower}{n}", "solver_parameters": json.dumps({"lower": lower})}
+        {
+            "cell": f"{lower}{n}",
+            "scenario": "swing",
+            "solver_parameters": json.dumps({"lower": lower}),
+        }
         for lower in (0.0, 0.9)
         for n in range(2)
     ]
