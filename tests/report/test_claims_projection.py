@@ -108,6 +108,35 @@ def test_cone_solvers_out_of_the_box(tmp_path):
     assert found.verdict is Verdict.FAILS
 
 
+def test_a_scaled_cone_solver_stands_for_one_that_was_not_run_out_of_the_box(tmp_path):
+    found = projection.any_solver(
+        Rows(tmp_path, claims__field=box(cvxpy_scs_default=VIOLATED, cvxpy_ecos={}))
+    )
+    assert "cvxpy-ecos optimal (gap 1e-7)" in found.numbers
+    assert "not measured yet: cvxpy-mosek-default." in found.numbers
+
+
+def test_the_cone_program_to_the_letter_about_the_target_and_far_away(tmp_path):
+    literal, rest = {"clarabel_paper": {}, "clarabel": {}}, {"mode": "replay:1-15"}
+    found = projection.cone_program(Rows(tmp_path, claims__field=named(**literal)))
+    assert found.verdict is Verdict.HOLDS
+    assert "Not measured yet: claims/field holds no cell with solver cvxpy-ecos." in found.second
+    worse = {**rest, **FEASIBLE, "projections_optimal": 4, "relative_gap_max": 0.08}
+    far = {"scenario": "stress", "case": "far", "severity": 1.0}
+    seen = Rows(
+        tmp_path,
+        claims__field=named(**literal, cvxpy_ecos={}),
+        claims__tightness=named(clarabel_paper=worse, cvxpy_ecos=rest),
+        failures=named(clarabel_paper={**far, **VIOLATED}, clarabel=far),
+    )
+    found = projection.cone_program(seen)
+    assert "optimal in 4 of 9 frames, with gaps up to 8e-2" in found.numbers
+    assert "optimal, gaps 1e-7 and 1e-7 (in motion, from rest)" in found.second
+    assert "Eq. 12 to the letter violates by 4e-5, with the quadratic objective it ends" in (
+        found.second
+    )
+
+
 def test_two_stationary_answers_are_taken_from_the_records():
     found = projection.not_convex(Evidence(Path(__file__).parents[2] / "results"))
     assert found.verdict is Verdict.HOLDS

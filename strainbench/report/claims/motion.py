@@ -39,7 +39,7 @@ HARDLY = 0.01
     "Animations stay smooth in time even when limits are tight.",
     MOTION,
     BY_STEP,
-    fairness="One measure of smoothness; the step. A limit that is met at once stops the cloth.",
+    fairness="One measure of smoothness; the step.",
 )
 def smooth(seen: Evidence) -> Finding:
     """Jitter by limit, over that of the free cloth."""

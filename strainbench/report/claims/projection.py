@@ -30,6 +30,7 @@ UNLIKE = ("newton-ipm", "clarabel", "admm", "ipopt", "linearized-qp")
 """Methods that have nothing in common but the problem."""
 FIRST_ORDER = ("cvxpy-scs-default",)
 OUT_OF_THE_BOX = ("clarabel-default", "qoco-default", "cvxpy-ecos-default", "cvxpy-mosek-default")
+SCALED = ("cvxpy-ecos", "cvxpy-mosek")
 STATIONARY = 1e-5  # KKT residual
 
 
@@ -189,10 +190,12 @@ def _unavailable(cell: pd.Series) -> str:
 )
 def any_solver(seen: Evidence) -> Finding:
     """Cone solvers out of the box."""
-    asked = seen.cells(FIELD, solver=OUT_OF_THE_BOX + FIRST_ORDER)
+    names = OUT_OF_THE_BOX + FIRST_ORDER
+    asked = seen.cells(FIELD, solver=names + SCALED)
     idle = asked["reason"].astype(str).str.startswith("unavailable")
     cells, others = asked[~idle], asked[idle]
-    missing = [s for s in OUT_OF_THE_BOX + FIRST_ORDER if s not in set(asked["solver"])]
+    known = {name.removesuffix("-default") for name in asked["solver"]}
+    missing = [s for s in names if s.removesuffix("-default") not in known]
     said = [f"{r['solver']} {ended(r)}" for _, r in cells.iterrows()]
     said += [_unavailable(r) for _, r in others.iterrows()]
     said += [f"not measured yet: {', '.join(missing)}"] if missing else []
@@ -200,7 +203,7 @@ def any_solver(seen: Evidence) -> Finding:
     interior = optimal[~cells["solver"].isin(FIRST_ORDER)]
     return Finding(
         Verdict.of(bool(optimal.all()), bool(len(interior) and interior.all())),
-        f"Out of the box: {'; '.join(said)}. {_first_order(cells)}".strip(),
+        f"Out of the box (`-default`), or scaled: {'; '.join(said)}. {_first_order(cells)}".strip(),
         aside(_said_solved, seen),
     )
 
