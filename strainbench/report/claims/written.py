@@ -16,9 +16,12 @@ from strainbench.report.claims import (
     failing,
     hernandez,
     hernandez_shapes,
+    methods,
+    motion,
     others,
     projection,
     rest,
+    robustness,
     scheme,
     table1,
 )
@@ -32,6 +35,7 @@ PAPERS = {
 }
 MODULES = (
     projection,
+    methods,
     rest,
     scheme,
     bdf2,
@@ -39,6 +43,8 @@ MODULES = (
     failing,
     others,
     cost,
+    robustness,
+    motion,
     hernandez,
     hernandez_shapes,
 )
