@@ -18,10 +18,11 @@ ON_FRAMES = at(
     "cvxpy-ecos,cvxpy-scs-default,ipopt,ipopt-default,ipopt-default-lbfgs,admm,linearized-qp,"
     "gauss-seidel,fast-projection,ipopt-edges --time-limit 180",
 )
-HARD = at(
-    "failures",
-    "run stress --solver all --set case=slivers,mass-ratio,displaced --set severity=1,0.1 --set "
-    "resolution=10 --time-limit 20 --steps 1",
+HARD = (
+    'make failures FAILURES=results/failures HARD="--set resolution=10 --time-limit 10 --solver '
+    "admm,augmented-lagrangian,clarabel,clarabel-default,clarabel-paper,cvxpy,cvxpy-ecos,cvxpy-scs,"
+    "dykstra,fast-projection,gauss-seidel,gauss-seidel-strain,gauss-seidel-principal,ipopt,"
+    'ipopt-edges,linearized-qp,newton-ipm,none,qoco,xpbd --results results/failures"'
 )
 UNLIKE = ("newton-ipm", "clarabel", "admm", "ipopt", "linearized-qp")
 """Methods that have nothing in common but the problem."""
