@@ -39,10 +39,10 @@ numbers by a rule in `strainbench/report/claims`; ratios hold within a folder, s
 ANEW = """\
 To measure anew, call a claim's commands in the checkout, in its environment (`make setup`, then
 `source .venv/bin/activate`, or `.venv/bin/strainbench` in place of `strainbench`). A folder keeps
-what it has: add `--rerun` to `strainbench run`, or give another `--results` or `-o`, such as
-`/tmp/new/claims/field` for `results/claims/field`, and have the verdicts from there by
-`strainbench claims --results /tmp/new`. `strainbench claims --measure` runs the commands of claims
-that are not measured yet."""
+what it has: add `--rerun` to `strainbench run`, or give another folder (`--results`, `-o`,
+`PAPER=`), such as `/tmp/new/claims/field` for `results/claims/field`, and have the verdicts from
+there by `strainbench claims --results /tmp/new`. `strainbench claims --measure` runs the commands
+of claims that are not measured yet, which takes hours."""
 SAID = {
     Verdict.HOLDS: ("holds", "hold"),
     Verdict.CONDITIONS: ("holds under conditions", "hold under conditions"),

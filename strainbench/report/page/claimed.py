@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import csv
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 
 from strainbench import escape
-from strainbench.document import Items, Part, Prose, Strong, Table
+from strainbench.document import Prose, Strong, Table
 
 FILE = "claims.csv"
 SHOWN = ("claim", "where", "words", "verdict", "what it rests on")
@@ -22,12 +23,17 @@ SIGNS = {
 """Before a verdict."""
 
 
-def claims_table(folder: Path) -> Part:
-    """A line a claim, its verdict with a sign; nothing where none were audited."""
-    for path in (folder / FILE, folder.absolute().parent / FILE):
-        if rows := _claims(path):
-            return Table("", SHOWN, [_line(row) for row in rows])
-    return Items([])
+def claims_table(folder: Path) -> Table:
+    """A line a claim, its verdict with a sign; none where none were audited."""
+    own, above = (_claims(place / FILE) for place in (folder, folder.absolute().parent))
+    return Table("", SHOWN, [_line(row) for row in own or above])
+
+
+def counted(claims: Table) -> str:
+    """How many claims there are, and of each verdict by its sign."""
+    signs = Counter(str(line[SHOWN.index("verdict")]).partition(" ")[0] for line in claims.lines)
+    told = ", ".join(f"{signs[sign]} {sign}" for sign in SIGNS.values() if signs[sign])
+    return f"{len(claims.lines)} claims: {told}"
 
 
 def _claims(path: Path) -> list[dict[str, str]]:
