@@ -39,6 +39,26 @@ def test_limits_that_are_never_violated_say_never(monkeypatch):
     assert table.texts()[0][3] == "never"
 
 
+def test_linear_limits_depend_on_what_stands_for_none(monkeypatch):
+    monkeypatch.setattr(fig4, "STEP", 0.02)
+    (printed,) = fig4.first_violated("linear", 2, 20.0)
+    (free,) = fig4.freed("linear", 2, 1e6)
+    (other,) = fig4.freed("linear", 2, 2.0)
+    assert (free.time_ms, free.top, free.stretch) == (
+        pytest.approx(printed.time_ms),
+        pytest.approx(printed.top),
+        pytest.approx(printed.stretch),
+    )
+    assert other.time_ms < printed.time_ms - 20
+
+
+def test_enforced_orthogonal_limits_freeze_the_beam(monkeypatch):
+    monkeypatch.setattr(fig4, "LASTS", 0.1)
+    (frozen,) = fig4.kept("orthogonal", "lcp-qp", 20.0)
+    (free,) = fig4.kept("hyperbolic", "none", 20.0)
+    assert 1 - frozen.top < 0.5 * (1 - free.top)
+
+
 def test_what_ends_a_method_is_said(monkeypatch):
     class Stopping(violation.Stage):
         def accept(self, projection):

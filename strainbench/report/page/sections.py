@@ -20,7 +20,7 @@ from strainbench.report.charts import Makers, scores
 from strainbench.report.failures import EXPLANATION
 from strainbench.report.local import local_table
 from strainbench.report.machine import machine_section
-from strainbench.report.page.claimed import claims_table
+from strainbench.report.page.claimed import claims_table, counted
 from strainbench.report.page.drawn import Drawn, drawings_of
 from strainbench.report.sweep import BEYOND
 from strainbench.report.table import LOCAL, OLDER, details, ledger_table, older, reasons
@@ -63,7 +63,8 @@ HEADS = {
     "claims": (
         "Claims of the papers",
         "✓ holds, ○ holds under conditions, ✗ does not hold here, - not testable here, ? not "
-        "measured yet; what each verdict rests on stands beside it.",
+        "measured yet; beside each verdict stand what it rests on, in whatever folder, and the "
+        "commands that measure it.",
     ),
     "pictures": ("Pictures", "Of the scenes."),
     "protocol": (
@@ -101,14 +102,14 @@ def sections(
     drawings = drawings_of(folder, runs, make, track)
     hard = [name for name, there in (("matrix", len(failed)), ("maps", mapped)) if there]
     boxes: dict[str, Sequence[str]] = {"table": ("table1", "cells"), "failures": hard}
-    swept = _swept(make.swept())
+    swept, claims = _swept(make.swept()), claims_table(folder)
     bodies = {
         "speed": Markup(),
         "table": _note(runs) + html(warm.table(runs), 3),
         "profile": Markup().join(html(table, 3) for table in scores(runs, steps)),
         "failures": _signs(failed, runs) + swept,
         "convergence": _folded("Energies in numbers", [make.energies()]),
-        "claims": html(claims_table(folder), 3),
+        "claims": _folded(counted(claims), [claims]),
         "pictures": _pictures(folder),
         "protocol": _protocol(folder, runs, machines),
     }

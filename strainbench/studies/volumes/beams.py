@@ -14,8 +14,10 @@ from strainbench.studies.volumes.part import Cell, Part, Plan, numbers, scene_of
 
 LASTS, TO_REST = 1.2, 4.0  # [s]
 CREEPS = 6.0  # [1/s] by which a beam is damped to come to rest
+SOFTER = (8e4, 1e5, 1.2e5, 1.5e5)  # [Pa]
 CELLS = (
     ("stiff", 2e5, "none", 20.0, CREEPS),
+    *(("stiff", young, "none", 20.0, CREEPS) for young in SOFTER),
     ("stiff", 2e5, "none", 20.0, 2.0),
     ("anisotropic", 5e3, "lcp-qp", 20.0, 2.0),
     ("anisotropic", 5e3, "lcp-qp", 10.0, 2.0),
@@ -91,7 +93,7 @@ PART = Part(
     cells,
     played,
     "The beams of Fig. 2",
-    "Each 1.2 s from rest, damped by masses, the one that is damped to come to rest 4 s; limits of "
+    "Each 1.2 s from rest, damped by masses, those that are damped to come to rest 4 s; limits of "
     "4%, but stiff beams have none, and 4 MPa is what keeps their strain below 4%. The tip is the "
     "middle of the free end, at first at (1, .1); the wobble is how much the length of the centre "
     "line varies in the second half. Strain is the largest of any principal stretch, at the end.",

@@ -21,7 +21,7 @@ from strainbench.solver.solver import run_solver
 from strainbench.studies.volumes.part import Part, numbers, scene_of
 
 BOUNDS = (0, 5, 40, 160, 10**9)  # rows; the paper's words are of 5 and 40
-LABELS = ("1 to 5", "6 to 40", "41 to 160", "above")
+LABELS = ("1 to 5", "6 to 40", "41 to 160", "above 160")
 MATERIALS, STEPS = ("anisotropic", "isotropic"), (5e-3, 20e-3)  # [s]
 LASTS = 0.24  # [s]
 METHODS = ("lcp-pgs", "lcp-qp")

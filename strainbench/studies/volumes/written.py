@@ -32,7 +32,8 @@ from strainbench.studies.volumes import (
 from strainbench.studies.volumes.part import Cell, Part, Plan
 
 PARTS = (
-    *(fig4.PART, violation.PART, violation.TIGHT_PART, sweeps.PART, growth.PART, cousin.PART),
+    *(fig4.PART, fig4.FREE_PART, fig4.ENFORCED_PART),
+    *(violation.PART, violation.TIGHT_PART, sweeps.PART, growth.PART, cousin.PART),
     *(cousin.BEAM_PART, beams.PART, repeated.PART, press.PART, pressed_by_load.PART),
     *(pressed_past.PART, certificates.PART),
 )
