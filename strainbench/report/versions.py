@@ -39,7 +39,7 @@ def shown_runs(folder: Path) -> list[Row]:
     changes = {name: changed_packages(facts) for name, facts in machines.items()}
     kept: dict[tuple[str, ...], Row] = {}
     for row in latest_runs(folder).values():
-        row = row | {"older": _older_source(row, now)}
+        row = row | {"older": _older_source(row, folder, now)}
         before = kept.get(_subject(row))
         if before is None or before["older"] or not row["older"]:
             kept[_subject(row)] = row
@@ -68,11 +68,12 @@ def _outside(source: str) -> str:
     return source if os.path.isabs(source) else ""
 
 
-def _older_source(row: Row, now: Callable[[str, tuple[str, ...]], str]) -> str:
+def _older_source(row: Row, folder: Path, now: Callable[[str, tuple[str, ...]], str]) -> str:
     """How the sources differ from those that a row was measured with.
 
     Parameters
     ----------
+    folder : of the rows; a plug-in from another machine is looked for there, by its name
     now : the digest of a source and of the files that words name, as they are
     """
     if not row["content"]:
@@ -81,10 +82,12 @@ def _older_source(row: Row, now: Callable[[str, tuple[str, ...]], str]) -> str:
         source = row[f"{name}_source"]
         if not source:  # of a solver that is unavailable
             continue
-        if not (ROOT / source).exists():
+        places = [source, *[str(folder.resolve() / Path(source).name)] * bool(_outside(source))]
+        here = next((place for place in places if (ROOT / place).exists()), None)
+        if here is None:
             return f"with {source}, which is gone"
         settings = json.loads(row[f"{name}_parameters"] or "{}").values()
-        if now(source, tuple(v for v in settings if isinstance(v, str))) != content:
+        if now(here, tuple(v for v in settings if isinstance(v, str))) != content:
             return f"with {source} before its latest edit"
     return ""
 

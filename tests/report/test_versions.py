@@ -76,6 +76,14 @@ def test_an_older_row_alone_is_shown_and_said_to_be_older(tmp_path, mine):
     assert line == f"1 of 1 cells were measured with {mine} before its latest edit"
 
 
+def test_a_plug_in_that_lies_beside_its_rows_is_theirs_wherever_they_are(tmp_path, mine):
+    measure(tmp_path, mine, seconds=1)
+    mine.rename(tmp_path / mine.name)
+    assert shown(tmp_path) == [("mine", "1", "")]
+    (tmp_path / mine.name).write_text("# another\n")
+    assert shown(tmp_path) == [("mine", "1", f"with {mine} before its latest edit")]
+
+
 def test_a_file_that_is_gone_is_said_to_be(tmp_path, mine):
     measure(tmp_path, mine, seconds=1)
     mine.unlink()
