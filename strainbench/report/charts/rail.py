@@ -11,6 +11,7 @@ from strainbench.report.charts.text import Box, width, wrapped
 from strainbench.report.measures import OUT_OF_TIME, VIOLATED
 from strainbench.report.rows import Row
 
+HEAD = "violates the limits (by), or out of time (steps done):"
 GROUND, INK = "#FBEDEA", "#A8281B"
 ROW = 1.35  # of a line, in its size
 

@@ -13,7 +13,7 @@ from strainbench.report.charts.axes import Axis, decades, length_tick, percent_t
 from strainbench.report.charts.canvas import Spec, about
 from strainbench.report.charts.chart import Chart
 from strainbench.report.charts.curves import Curve, Curves, point
-from strainbench.report.charts.rail import why_failed
+from strainbench.report.charts.rail import HEAD, why_failed
 from strainbench.report.charts.target import Target
 from strainbench.report.measures import COUNT, OPTIMAL, duration
 from strainbench.report.names import cells as cells_of
@@ -22,7 +22,6 @@ from strainbench.report.rows import Row, rows_of
 from strainbench.report.sweep import beyond, differs, sweeps
 
 SPAN = 8.0  # between the least and the largest value, from which on an axis is logarithmic
-HEAD = "violates the limits (by), or out of time (steps done):"
 CAPTION = """\
 Filled: optimal on every step; hollow: within the limits, not optimal. A line is broken where its
 method failed, which is named at the top. Times are medians over the projections with active

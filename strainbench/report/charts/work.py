@@ -15,7 +15,7 @@ from strainbench.report.charts.axes import Axis, decades, length_tick, power_tic
 from strainbench.report.charts.bands import QUESTION, name_band, question, unknown_band
 from strainbench.report.charts.canvas import SOFT, Plane, about, raw
 from strainbench.report.charts.chart import Chart
-from strainbench.report.charts.rail import draw_rail, rail_height, why_failed
+from strainbench.report.charts.rail import HEAD, draw_rail, rail_height, why_failed
 from strainbench.report.charts.target import Target
 from strainbench.report.charts.text import Box, Name, Placed, place
 from strainbench.report.measures import COUNT, OPTIMAL, duration, length
@@ -32,7 +32,6 @@ USED = [
     *("ending", "done", "why", "time", "time_low", "time_high"),
     *("distance_bound_max", "max_violation", "reference_error_max"),
 ]
-HEAD = "violates the limits (by), or out of time (steps done):"
 FLOOR = 1e-9
 """Less, in mm or relative, is drawn at the lower edge, with an arrow and its value."""
 
@@ -68,8 +67,7 @@ CAPTION = """\
 Time: median over the projections with active constraints, bars from the first to the third
 quartile. Filled: optimal on every step; hollow: within the limits, not optimal. Stair: what no
 method beats in both. Grey: below the largest error of the references."""
-UNANSWERED = "no method has an answer that counts"
-UNMEASURED = "no certified optimum to measure from"
+EMPTY = ("no method has an answer that counts", "no certified optimum to measure from")
 
 
 def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance") -> list[Chart]:
@@ -162,8 +160,8 @@ class Panel:
         plane = Plane(self.target, self.title, self.x, y, rail=rail, height=height)
         if empty:
             middle = {"px": plane.width / 2, "py": height / 2, "ink": SOFT}
-            within = any(run["ending"] in COUNT for run in self.runs)
-            plane.texts([middle | {"text": UNMEASURED if within else UNANSWERED}], "center")
+            why = EMPTY[any(run["ending"] in COUNT for run in self.runs)]
+            plane.texts([middle | {"text": why}], "center")
         if self.target.interactive:
             question(plane)
         errors = (run["reference_error_max"] for run in self.runs)
