@@ -159,9 +159,9 @@ class Panel:
         height = 3 * self.target.sizes.text if empty else 0.0
         plane = Plane(self.target, self.title, self.x, y, rail=rail, height=height)
         if empty:
-            middle = {"px": plane.width / 2, "py": height / 2, "ink": SOFT}
-            why = EMPTY[any(run["ending"] in COUNT for run in self.runs)]
-            plane.texts([middle | {"text": why}], "center")
+            said = EMPTY[any(run["ending"] in COUNT for run in self.runs)]
+            middle = {"px": plane.width / 2, "py": height / 2, "ink": SOFT, "text": said}
+            plane.texts([middle], "center")
         if self.target.interactive:
             question(plane)
         errors = (run["reference_error_max"] for run in self.runs)
