@@ -82,9 +82,7 @@ def work_precision(runs: pd.DataFrame, target: Target, against: str = "distance"
     methods = runs[runs["solver"] != UNCONSTRAINED]
     named = {"accuracy": accuracy.of(methods), "label": labels(methods)}
     methods = methods[USED].assign(**named)
-    replays_first = methods.sort_values(
-        "mode", key=lambda modes: ~modes.map(replays), kind="stable"
-    )
+    replays_first = methods.sort_values("mode", key=lambda m: ~m.map(replays), kind="stable")
     charts: list[Chart] = []
     stem = "speed-accuracy" if against == "distance" else f"speed-{against}"
     figures = replays_first.groupby(FIGURE, sort=False, dropna=False)
