@@ -129,7 +129,7 @@ def claimed() -> dict[str, list[str]]:
     """The commands of claims that write into a folder of results."""
     found: dict[str, list[str]] = {}
     for command in dict.fromkeys(c for claim in CLAIMS.values() for c in claim.commands):
-        if target := re.search(r"--results results/(claims/\S+)", command):
+        if target := re.search(r"(?:--results|-o) results/(claims/\w+)", command):
             found.setdefault(target[1], []).append(command)
     return found
 
