@@ -288,7 +288,7 @@ def test_smoothness_of_all_limits(tmp_path, loose, tight, verdict):
     assert ("10% is 1.7 times rougher" in found.numbers) == (loose > 0.4)
     looks(
         tmp_path,
-        "steps.csv",
+        "timesteps.csv",
         [
             {"solver": s, "limit": v, "step": 1 / 240, "jitter": 0.1, "resolution": 10}
             for s in ("none", "newton-ipm")

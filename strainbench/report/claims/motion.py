@@ -18,9 +18,9 @@ MOTION = at(
     "run swing --solver newton-ipm,none --set resolution=20 --set limit=10%,1%,0.1% --steps 60",
 )
 BY_STEP = LOOK.format(
-    "swing --solver newton-ipm,none --set resolution=10 --set step=1/60,1/240 --set "
+    "swing --solver newton-ipm,none --set resolution=10 --set step=0.0166666667,0.0041666667 --set "
     "limit=10%,1%,0.1% --duration 1",
-    "steps.csv",
+    "timesteps.csv",
 )
 BY_SIZE = LOOK.format(
     "swing --set resolution=10,20,40 --set limit=10%,1%,0.1% --duration 0.5", "sizes.csv"
@@ -69,7 +69,7 @@ def _rougher(by: dict[float, float], free: float) -> str:
 
 def _shorter(seen: Evidence) -> str:
     """The same at two steps."""
-    rows = seen.table(LOOKS, "steps.csv")
+    rows = seen.table(LOOKS, "timesteps.csv")
     told = [
         f"1/{1 / step:.0f} s {_of(of, 'none'):.2f} without limits, {_by_limit(_jitters(of), '.2f')}"
         for step, of in rows.groupby("step", sort=False)
