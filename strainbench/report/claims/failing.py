@@ -20,8 +20,8 @@ _BY_DEFAULT = (
     f"run swing --mode replay --frames 2-10 --set resolution={{}} --solver {EXACT},{LBFGS},{EDGES} "
     "--time-limit {}"
 )
-SECONDS = {10: 120, 20: 300, 40: 300}
-"""Of a cell, by cells a side."""
+SIZES = (10, 20, 40)
+"""Cells a side."""
 
 
 class Tally(NamedTuple):
@@ -111,25 +111,22 @@ def ipopt_by_default(seen: Evidence) -> Finding:
     answered = ", ".join(f"{n} cells {t.finished} of {t.asked}" for n, t in edges.items())
     return Finding(
         ipopt_verdict(lbfgs, exact),
-        f"Frames within the limits: L-BFGS {_by_size(lbfgs, tuple(SECONDS))}; exact Hessian "
-        f"{_by_size(exact, tuple(SECONDS))}. {_reading(lbfgs, exact)}",
+        f"Frames within the limits: L-BFGS {_by_size(lbfgs, SIZES)}; exact Hessian "
+        f"{_by_size(exact, SIZES)}. {_reading(lbfgs, exact)}",
         or_missing(lambda: _ipopt_closed(seen))
         + (f" Limits on edges after Jin et al., with L-BFGS: answers {answered}." if edges else ""),
     )
 
 
 def _frames(seen: Evidence, solver: str) -> dict[int, Tally]:
-    return _each(
-        tuple(SECONDS),
-        lambda n: tally(seen, IPOPT, solver=solver, resolution=n, time_limit=SECONDS[n]),
-    )
+    return _each(SIZES, lambda n: tally(seen, IPOPT, solver=solver, resolution=n))
 
 
 def ipopt_verdict(lbfgs: dict[int, Tally], exact: dict[int, Tally]) -> Verdict:
     """Holds if one Hessian has the pattern by failing; under conditions if L-BFGS by the clock."""
-    if any(n not in lbfgs for n in SECONDS):
+    if any(n not in lbfgs for n in SIZES):
         return Verdict.UNMEASURED
-    both = [of for of in (lbfgs, exact) if all(n in of for n in SECONDS)]
+    both = [of for of in (lbfgs, exact) if all(n in of for n in SIZES)]
     fails = [
         of[10].all and 0 < of[20].within < of[20].asked and of[40].failing and not of[40].within
         for of in both
