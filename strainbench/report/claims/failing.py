@@ -20,8 +20,8 @@ _BY_DEFAULT = (
     f"run swing --mode replay --frames 2-10 --set resolution={{}} --solver {EXACT},{LBFGS},{EDGES} "
     "--time-limit {}"
 )
-SIZES = (10, 20, 40)
-"""Cells a side."""
+REPLAYED = (10, 20, 40)
+"""Cells a side of their frames."""
 
 
 class Tally(NamedTuple):
@@ -111,22 +111,22 @@ def ipopt_by_default(seen: Evidence) -> Finding:
     answered = ", ".join(f"{n} cells {t.finished} of {t.asked}" for n, t in edges.items())
     return Finding(
         ipopt_verdict(lbfgs, exact),
-        f"Frames within the limits: L-BFGS {_by_size(lbfgs, SIZES)}; exact Hessian "
-        f"{_by_size(exact, SIZES)}. {_reading(lbfgs, exact)}",
+        f"Frames within the limits: L-BFGS {_by_size(lbfgs, REPLAYED)}; exact Hessian "
+        f"{_by_size(exact, REPLAYED)}. {_reading(lbfgs, exact)}",
         or_missing(lambda: _ipopt_closed(seen))
         + (f" Limits on edges after Jin et al., with L-BFGS: answers {answered}." if edges else ""),
     )
 
 
 def _frames(seen: Evidence, solver: str) -> dict[int, Tally]:
-    return _each(SIZES, lambda n: tally(seen, IPOPT, solver=solver, resolution=n))
+    return _each(REPLAYED, lambda n: tally(seen, IPOPT, solver=solver, resolution=n))
 
 
 def ipopt_verdict(lbfgs: dict[int, Tally], exact: dict[int, Tally]) -> Verdict:
     """Holds if one Hessian has the pattern by failing; under conditions if L-BFGS by the clock."""
-    if any(n not in lbfgs for n in SIZES):
+    if any(n not in lbfgs for n in REPLAYED):
         return Verdict.UNMEASURED
-    both = [of for of in (lbfgs, exact) if all(n in of for n in SIZES)]
+    both = [of for of in (lbfgs, exact) if all(n in of for n in REPLAYED)]
     fails = [
         of[10].all and 0 < of[20].within < of[20].asked and of[40].failing and not of[40].within
         for of in both
