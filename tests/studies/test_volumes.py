@@ -132,7 +132,7 @@ def test_meshes_that_are_none_are_named(resolution, tmp_path):
 
 
 def test_a_part_that_is_none_is_named(tmp_path):
-    with pytest.raises(SystemExit, match="--part fig5: valid are fig4, violation"):
+    with pytest.raises(SystemExit, match="--part fig5: valid are fig4, free, enforced, violation"):
         written.main("5", "2", "fig4,fig5", tmp_path)
 
 
