@@ -17,6 +17,7 @@ import pytest
 from strainbench.bench.columns import RUN_COLUMNS, STEP_COLUMNS
 from strainbench.bench.records import RUNS, STEPS, append_rows, latest_runs, latest_steps
 from strainbench.report import write_report
+from strainbench.report.measures import cut_off_by_clock
 from tests.browser import Browser, chromium
 from tests.imports import HERE
 from tests.report.test_report import row
@@ -343,10 +344,10 @@ def in_sweeps(page, runs):
 
 
 def in_energies(folder, steps):
-    """The same of the energies in numbers: of each run's first step and last, in mJ."""
+    """The same of the energies in numbers: of each run's first step and last one done, in mJ."""
     firsts, lasts = set(), set()
     for of in steps.values():
-        told = [s for s in of if s["kinetic_energy"]]
+        told = [s for s in of if s["kinetic_energy"] and not cut_off_by_clock(s["status"])]
         if told:
             sums = [sum(float(s[f"{part}_energy"]) for part in PARTS) for s in (told[0], told[-1])]
             firsts.add(1000 * sums[0])
