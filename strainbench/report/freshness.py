@@ -11,19 +11,23 @@ import re
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from strainbench.bench.records import MACHINES, RUNS, RecordsError, read_machines
 from strainbench.report.claims.written import CLAIMS
-from strainbench.report.provenance import made_with_this_code
+from strainbench.report.provenance import ONLY_TELLS, made_with_this_code
 from strainbench.report.versions import changed_packages, shown_runs
-from strainbench.sources import PACKAGES, TELLING
+from strainbench.sources import PACKAGES, SUITE, TELLING
 
 FRESH = "as the code is now"
 NO_COMMAND = "none is known"
 OURS = r"(?:strainbench|make|python -m strainbench\S*|python -m pytest) [^`\n]*"
+STUDIES = {"converge": "convergence", "map": "stability"} | {
+    name: name for name in ("duel", "ledger", "sensitivity", "step")
+}
+"""Of verbs, the folder of strainbench/studies that they call."""
 LOCAL = "local"
 """Folder of what is not committed."""
 
@@ -54,7 +58,7 @@ def freshness(root: Path) -> list[Standing]:
     for folder in folders(root):
         name = folder.relative_to(root).as_posix()
         told = list(dict.fromkeys(own_commands(folder))) or known.get(name, [NO_COMMAND])
-        found.append(Standing(name, _what(folder), age(folder), told))
+        found.append(Standing(name, _what(folder), age(folder, told), told))
     if not found:
         raise RecordsError(f"{root} has no folder of results")
     return found
@@ -70,18 +74,23 @@ def _what(folder: Path) -> str:
     return f"{len(shown_runs(folder))} cells" if (folder / RUNS).exists() else "a study"
 
 
-def age(folder: Path) -> list[str]:
-    """In what ways a folder is older than the code; nothing if in none."""
+def age(folder: Path, commands: Sequence[str] = ()) -> list[str]:
+    """In what ways a folder is older than the code; nothing if in none.
+
+    Parameters
+    ----------
+    commands : that measure it: of the studies those count that they call
+    """
     if (folder / RUNS).exists():
         rows = shown_runs(folder)
         counts = Counter(row["older"] for row in rows if row["older"])
         return [f"{count} of {len(rows)} cells {how}" for how, count in counts.items()]
     machines = read_machines(folder) if (folder / MACHINES).exists() else {}
     changes = dict.fromkeys(filter(None, map(changed_packages, machines.values())))
-    return [*([] if made_with_this_code(machines) else edits(folder)), *changes]
+    return [*([] if made_with_this_code(machines) else edits(folder, commands)), *changes]
 
 
-def edits(folder: Path) -> list[str]:
+def edits(folder: Path, commands: Sequence[str] = ()) -> list[str]:
     """How many edits of what a study measures are newer than its oldest numbers."""
     numbers = sorted(folder.glob("*.csv")) or sorted(folder.glob("*.md"))
     since = {
@@ -89,7 +98,8 @@ def edits(folder: Path) -> list[str]:
     }
     if not all(since.values()):
         return ["not known: its numbers stand in no history"]
-    rooms = [f":(top,exclude){PACKAGES[0]}/{room}" for room in TELLING if room != "studies"]
+    left_out = [room for room in TELLING if room != "studies"] + _other_studies(commands)
+    rooms = [f":(top,exclude){PACKAGES[0]}/{room}" for room in left_out]
     newer = {}
     for path, told in since.items():
         base = f"{told.split()[0]}..HEAD"
@@ -98,6 +108,17 @@ def edits(folder: Path) -> list[str]:
     oldest = max(newer, key=lambda path: newer[path])
     when = since[oldest].split()[1]
     return [f"{newer[oldest]} edits since {oldest.name} of {when}"] if newer[oldest] else []
+
+
+def _other_studies(commands: Sequence[str]) -> list[str]:
+    """Studies that commands do not call, where they call some, and what only tells in any."""
+    words = [
+        re.match(r"strainbench (\w+)|python -m strainbench\.studies\.(\w+)", c) for c in commands
+    ]
+    called = {STUDIES.get(m[1], "") if m[1] else m[2] for m in words if m} - {""}
+    every = {path.stem for path in (SUITE / "studies").iterdir()}
+    others = sorted(every - called) if called else []
+    return [f"studies/{name}*" for name in (*others, *(f"*/{file}" for file in ONLY_TELLS))]
 
 
 def _git(folder: Path, *words: str) -> str:
@@ -129,7 +150,7 @@ def claimed() -> dict[str, list[str]]:
     """The commands of claims that write into a folder of results."""
     found: dict[str, list[str]] = {}
     for command in dict.fromkeys(c for claim in CLAIMS.values() for c in claim.commands):
-        if target := re.search(r"(?:--results|-o) results/(claims/\w+)", command):
+        if target := re.search(r"(?:--results|-o) results/(claims/[\w-]+)", command):
             found.setdefault(target[1], []).append(command)
     return found
 

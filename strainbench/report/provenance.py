@@ -14,6 +14,8 @@ from strainbench.bench.records import remember_machine
 from strainbench.sources import PACKAGES, ROOT, SUITE, TELLING, digest
 
 CODE = "code"
+ONLY_TELLS = ("chart.py", "report.py")
+"""Files of studies that no number depends on."""
 
 
 def remember_study(folder: Path, study: str, machine: str, facts: Mapping[str, object]) -> None:
@@ -46,4 +48,5 @@ def _sources() -> Iterator[Path]:
 def _counts(file: Path, study: str) -> bool:
     """Whether a file decides a study's numbers: none that only tells, and no other study."""
     room, *rest = file.relative_to(SUITE).parts if file.is_relative_to(SUITE) else ("",)
-    return room not in TELLING or (room == "studies" and study in rest[:1])
+    own = room == "studies" and study in rest[:1] and file.name not in ONLY_TELLS
+    return own or room not in TELLING

@@ -85,6 +85,29 @@ def test_a_study_is_held_against_the_history_of_its_code(tmp_path):
         assert [told.split(" edits since a.csv")[0] for told in age(study)] == [str(edits)][:edits]
 
 
+def test_of_studies_those_count_that_the_commands_of_a_folder_call(tmp_path):
+    study = tmp_path / "results/study"
+    study.mkdir(parents=True)
+    (study / "a.csv").write_text("a\n1\n")
+    git(tmp_path, "init", "-q")
+    git(tmp_path, "add", "-A")
+    git(tmp_path, "commit", "-qm", "measured")
+    for file in ("duel/measure.py", "duel/report.py", "euler.py"):
+        path = tmp_path / "strainbench/studies" / file
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.touch()
+        git(tmp_path, "add", "-A")
+        git(tmp_path, "commit", "-qm", file)
+    told = {
+        command: [said.split()[0] for said in age(study, [command])]
+        for command in (
+            *("strainbench duel swing", "strainbench map swing", "make certificates"),
+            "python -m strainbench.studies.euler swing",
+        )
+    }
+    assert list(told.values()) == [["1"], [], ["2"], ["1"]]
+
+
 def test_a_study_that_keeps_the_digest_of_what_it_measured_needs_no_history(tmp_path):
     (tmp_path / "a.csv").write_text("a\n1\n")
     machine, facts = describe_machine(1)
@@ -97,7 +120,8 @@ def test_a_study_that_keeps_the_digest_of_what_it_measured_needs_no_history(tmp_
 def test_the_digest_of_a_study_is_of_what_it_measures():
     assert code_digest("step") != code_digest("ledger")
     assert _counts(SUITE / "studies/step/measure.py", "step")
-    assert not _counts(SUITE / "studies/ledger/report.py", "step")
+    assert not _counts(SUITE / "studies/ledger/measure.py", "step")
+    assert not _counts(SUITE / "studies/step/report.py", "step")
     assert not _counts(SUITE / "report/table.py", "step")
     assert _counts(SUITE / "bench/runner.py", "step")
     assert _counts(SUITE.parent / "solvers/clarabel.py", "step")
