@@ -11,7 +11,7 @@ import pandas as pd
 
 from strainbench.bench.mode import replays
 from strainbench.document import Column, Document, Prose, Table
-from strainbench.report.measures import COUNT, OUT_OF_TIME, VIOLATED, digits, distance_of
+from strainbench.report.measures import COUNT, NO_ANSWER, OUT_OF_TIME, VIOLATED, digits, distance_of
 from strainbench.report.names import SPANNED, settings
 from strainbench.report.numbers import power
 from strainbench.report.rows import Row, rows_of
@@ -45,7 +45,7 @@ FAMILIES = {
 SECONDS = (
     "Mean over all steps, without set-up, as in the paper; its own on an i9-7900X with MOSEK and "
     "Ipopt 3.14. `*`: not within the limits on some step; `(n)`: the mean over the n steps that "
-    "were done in time; `-`: none was."
+    "were done before the clock or a failure ended the cell; `-`: none was."
 )
 RATIOS = (
     "Seconds over those of implicit Euler, the paper's over its own: unlike seconds, these "
@@ -166,7 +166,7 @@ def _marked(row: Row, value: float) -> str:
     if not row["done"] or not isfinite(value):
         return NONE
     star = "*" if row["ending"] == VIOLATED or row["astray"] > 0 else ""
-    steps = f" ({row['done']:.0f})" if row["ending"] == OUT_OF_TIME else ""
+    steps = f" ({row['done']:.0f})" if row["ending"] in (OUT_OF_TIME, NO_ANSWER) else ""
     return digits(value, 3) + star + steps
 
 
@@ -174,6 +174,6 @@ def _away(row: Row) -> str:
     """Its distance, where it is within the limits."""
     if row["ending"] in COUNT:
         return distance_of(row)
-    if row["ending"] == OUT_OF_TIME:
+    if row["ending"] in (OUT_OF_TIME, NO_ANSWER):
         return f"({row['done']:.0f})" if row["done"] else NONE
     return f"(by {power(row['max_violation'])})" if isfinite(row["max_violation"]) else NONE

@@ -10,7 +10,7 @@ import pytest
 from strainbench.bench.columns import RUN_COLUMNS
 from strainbench.bench.records import RUNS, append_rows
 from strainbench.report import load_runs
-from strainbench.report.measures import OUT_OF_TIME
+from strainbench.report.measures import NO_ANSWER, OUT_OF_TIME
 from strainbench.report.printed import PAPER_SECONDS, SIZES, STARRED, _marked, printed_tables
 from tests.report.test_report import row
 
@@ -74,6 +74,7 @@ def test_steps_beyond_the_limits_are_starred_though_the_clock_ended_the_cell():
     assert _marked({**ended, "astray": 4}, 0.5) == "0.500* (25)"
     assert _marked({**ended, "astray": 0}, 0.5) == "0.500 (25)"
     assert _marked({"ending": OUT_OF_TIME, "done": 0, "astray": 0}, 0.5) == "-"
+    assert _marked({"ending": NO_ANSWER, "done": 11, "astray": 0}, 0.5) == "0.500 (11)"
 
 
 def test_implicit_euler_is_the_mean_of_its_runs_which_no_limit_changes(tables):
