@@ -22,7 +22,9 @@ from strainbench.arrays import FloatArray, IntArray
 from strainbench.document import Table
 from strainbench.document.writers import csv
 from strainbench.files import write_whole
+from strainbench.progress import Track, untracked
 from strainbench.scenario.registry import find_scenario
+from strainbench.studies.watched import watched
 
 SHAPES = ("isotropic", "orthotropic", "anisotropic")
 HEADER = ("shape", "resolution", "other", "other_resolution", "hausdorff")
@@ -50,7 +52,9 @@ def hausdorff(one: FloatArray, other: FloatArray) -> float:
     return float(max(there.max(), back.max()))
 
 
-def distances(resolutions: list[int]) -> list[tuple[str, int, str, int, float]]:
+def distances(
+    resolutions: list[int], track: Track = untracked
+) -> list[tuple[str, int, str, int, float]]:
     """Of each two drapes, the shapes' on all meshes [m].
 
     Raises
@@ -58,7 +62,8 @@ def distances(resolutions: list[int]) -> list[tuple[str, int, str, int, float]]:
     ArithmeticError
         If one was not found to the tolerance.
     """
-    drapes = {(shape, n): _surface(shape, n) for n in resolutions for shape in SHAPES}
+    each = [(shape, n) for n in resolutions for shape in SHAPES]
+    drapes = {one: _surface(*one) for one in track(each, "drapes", len(each))}
     return [
         (*one, *other, hausdorff(drapes[one], drapes[other]))
         for one, other in combinations(drapes, 2)
@@ -79,11 +84,12 @@ def run(
     """Write the distances of the drapes of a scene's curves."""
     try:
         resolutions = [int(word) for word in resolution.split(",")]
-        found = distances(resolutions)
+        found = distances(resolutions, watched)
     except (ValueError, ArithmeticError) as error:
         raise SystemExit(f"strainbench.studies.drapes: {error}") from None
     output.mkdir(parents=True, exist_ok=True)
     write_whole(output / FILE, csv(Table("", list(HEADER), found)).encode())
+    print(f"wrote {output / FILE}")
 
 
 if __name__ == "__main__":

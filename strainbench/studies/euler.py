@@ -31,6 +31,7 @@ from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
 from strainbench.physics.integrators import Motion, Project, step_and_project
 from strainbench.physics.linear import LinearSolver, available_linear_solvers
+from strainbench.progress import Track, untracked
 from strainbench.report.machine import machine_section
 from strainbench.report.output import check_ending, write_output
 from strainbench.scenario.cloth import ClothScenario
@@ -38,6 +39,7 @@ from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.stage import Stage
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solver
+from strainbench.studies.watched import watched
 
 HEADER = (
     *("solver", "converged", "iterations", "factor.", "evaluations", "step [ms]"),
@@ -61,7 +63,10 @@ class Measured:
 
 
 def profile(
-    scenario: ClothScenario, steps: int, project: Project = lambda target: target
+    scenario: ClothScenario,
+    steps: int,
+    project: Project = lambda target: target,
+    track: Track = untracked,
 ) -> dict[str, list[Measured]]:
     """Every step of every installed linear solver, by the solver's name."""
     cloth = scenario.cloth()
@@ -81,7 +86,7 @@ def profile(
 
     positions = scenario.sheet()[2]
     motion = Motion(positions, np.zeros_like(positions), 0.0)
-    for _ in range(steps):
+    for _ in track(range(steps), "steps", steps):
         motion = step_and_project(motion, scenario.step, minimise, project)
     return measured
 
@@ -149,7 +154,7 @@ def run(
     except ValueError as error:
         raise SystemExit(f"strainbench.studies.euler: {error}") from None
     profile(small, 1)  # compiles
-    measured = profile(scene, steps, project)
+    measured = profile(scene, steps, project, watched)
     title = f"{name} {resolution}x{resolution}, {steps} steps of {step:.4g} s, solver {solver}"
     found = table(measured, title)
     Console(width=150).print(terminal(found))

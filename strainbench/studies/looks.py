@@ -38,6 +38,7 @@ from strainbench.report.machine import machine_section
 from strainbench.report.output import check_ending, write_output
 from strainbench.scenario.scenario import Scenario
 from strainbench.scenario.stage import Stage, StageError
+from strainbench.studies.watched import watched
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ def run(
             check_ending(output)
         solvers = solver.split(",")
         cells = plan(names, solvers, choices, "simulate", steps, [1e-6], None, duration)
-        rows = [row(cell) for cell in cells]
+        rows = [row(cell) for cell in watched(cells, "motions", len(cells))]
     except (ValueError, StageError) as error:
         raise SystemExit(f"strainbench.studies.looks: {error}") from None
     found = table(rows)
