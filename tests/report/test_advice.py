@@ -23,7 +23,7 @@ from strainbench.report.question import Question
 from tests.command import command
 from tests.report.test_report import row
 
-FIELD = Path(__file__).parents[2] / "results/field"
+FIELD = Path(__file__).parent / "records/field"
 COLUMNS = {"mm": ("distance_max", 1e-3), "gap": ("relative_gap_max", 1)}
 COLUMNS |= {"violation": ("max_violation", 1)}
 

@@ -19,7 +19,7 @@ from strainbench.report.charts.text import Box, Name, place, spread, width, wrap
 from strainbench.report.measures import measured
 from strainbench.report.steps import newest_steps
 
-FIELD = Path(__file__).parents[2] / "results/field"
+FIELD = Path(__file__).parent / "records/field"
 
 
 @pytest.fixture(scope="module")

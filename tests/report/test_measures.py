@@ -23,7 +23,7 @@ from strainbench.report.measures import (
 )
 from strainbench.report.steps import newest_steps
 
-FIELD = Path(__file__).parents[2] / "results/field"
+FIELD = Path(__file__).parent / "records/field"
 
 
 def steps(*rows):
@@ -97,7 +97,7 @@ def test_what_the_clock_cut_off_is_out_of_time_and_no_violation(row, rows, expec
     assert finish(row, steps(*rows)) == expected
 
 
-def test_the_committed_field_says_who_ran_out_of_time():
+def test_records_say_who_ran_out_of_time():
     runs = load_runs(FIELD)
     steps = newest_steps(FIELD, runs)
     runs = measured(runs, steps).set_index("cell")

@@ -37,9 +37,9 @@ def browser(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def field(tmp_path_factory):
-    """The report of committed results: two sizes, 18 methods."""
+    """The report of records that stay as they are: two sizes, 18 methods."""
     folder = tmp_path_factory.mktemp("field") / "field"
-    shutil.copytree(HERE / "results/field", folder)
+    shutil.copytree(HERE / "tests/report/records/field", folder)
     write_report(folder)
     return folder
 

@@ -17,7 +17,7 @@ from strainbench.report.measures import measured
 from strainbench.report.steps import newest_steps
 
 RESULTS = Path(__file__).parents[2] / "results"
-FIELD = RESULTS / "field"
+FIELD = Path(__file__).parent / "records/field"
 
 
 @pytest.fixture(scope="module")
