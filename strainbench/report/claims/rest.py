@@ -23,8 +23,8 @@ CONTACT = "claims/contact"
     f"python -m strainbench.studies.drapes --resolution 15,30 -o results/{APART}",
     at(
         "drape",
-        "run drape --solver newton-ipm --set resolution=60 --set "
-        "shape=isotropic,orthotropic,anisotropic --steps 2",
+        "run drape --solver newton-ipm --set resolution=30 --set "
+        "shape=isotropic,orthotropic,anisotropic --steps 5",
     ),
     fairness="Their curves are read off a plot; a drape is one of several minima.",
 )
@@ -63,12 +63,12 @@ def _apart(table: pd.DataFrame, one: tuple[str, int], other: tuple[str, int]) ->
 
 
 def _heights(seen: Evidence) -> str:
-    at_rest = {"solver": "newton-ipm", "resolution": 60}
+    at_rest = {"solver": "newton-ipm", "resolution": 30}
     cells = {name: seen.cells("drape", shape=name, **at_rest).tail(1) for name in SHAPES}
     low = {n: 1000 * seen.steps("drape", c, "gravity_energy").iloc[-1] for n, c in cells.items()}
     most, least = max(low.values()), min(low.values())
     return (
-        "Energies of gravity at 60 cells, so heights of the centres of mass: "
+        "Energies of gravity at 30 cells, so heights of the centres of mass: "
         + ", ".join(f"{energy:.2f} mJ ({name})" for name, energy in low.items())
         + f", up to {100 * (most - least) / abs(least):.0f}% apart, of the last two "
         f"{100 * abs(low['orthotropic'] / low['anisotropic'] - 1):.1f}%."
