@@ -21,7 +21,7 @@ from scipy.spatial import cKDTree
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.document import Table
 from strainbench.document.writers import csv
-from strainbench.files import write_whole
+from strainbench.files import open_folder, write_whole
 from strainbench.progress import Track, untracked
 from strainbench.scenario.registry import find_scenario
 from strainbench.studies.watched import watched
@@ -82,12 +82,16 @@ def run(
     ),
 ) -> None:
     """Write the distances of the drapes of a scene's curves."""
+    words = resolution.split(",")
+    if not all(word.isdecimal() for word in words):
+        raise SystemExit(
+            f"--resolution {resolution}: whole numbers with commas, such as 15,30, are valid"
+        )
     try:
-        resolutions = [int(word) for word in resolution.split(",")]
-        found = distances(resolutions, watched)
+        open_folder(output, "-o")
+        found = distances([int(word) for word in words], watched)
     except (ValueError, ArithmeticError) as error:
         raise SystemExit(f"strainbench.studies.drapes: {error}") from None
-    output.mkdir(parents=True, exist_ok=True)
     write_whole(output / FILE, csv(Table("", list(HEADER), found)).encode())
     print(f"wrote {output / FILE}")
 

@@ -12,7 +12,8 @@ import pytest
 from strainbench.report.claims import cost, methods, motion, projection, robustness
 from strainbench.report.claims.claim import Verdict
 from strainbench.report.claims.evidence import Evidence, NotThereError
-from strainbench.report.claims.reading import aside, loads, seconds_to, tally
+from strainbench.report.claims.reading import loads, seconds_to, tally
+from strainbench.report.claims.sides import or_missing
 
 OPTIMAL: dict[str, Any] = {
     **{"ending": "optimal", "why": "", "reason": "", "relative_gap_max": 1e-7, "time": 1.0},
@@ -57,7 +58,7 @@ def named(**how: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def test_what_is_missing_on_another_side_is_said(tmp_path):
-    assert aside(tally, Evidence(tmp_path)) == (  # type: ignore[arg-type]
+    assert or_missing(tally, Evidence(tmp_path)) == (  # type: ignore[arg-type]
         "Not measured yet: certificates holds no tally.md."
     )
     (tmp_path / "certificates").mkdir()

@@ -7,7 +7,8 @@ import pandas as pd
 from strainbench.report.claims.claim import Finding, Verdict, at, claim
 from strainbench.report.claims.evidence import Evidence, NotThereError
 from strainbench.report.claims.projection import CONES, FIELD, FRAMES, ON_FRAMES, TIGHTNESS, ended
-from strainbench.report.claims.reading import aside, loads, time_over
+from strainbench.report.claims.reading import loads, time_over
+from strainbench.report.claims.sides import or_missing
 from strainbench.report.measures import COUNT, duration
 
 FOUR = ",".join(CONES)
@@ -71,7 +72,7 @@ def cheaper_than_nlp(seen: Evidence) -> Finding:
         f"times as long as Clarabel out of the box. {_class(over, over_literal)}".strip(),
         "Iterations, and an iteration: "
         + "; ".join(_iterations(c) for c in (ipopt, clarabel, literal))
-        + f". {aside(_to_gap, seen)}",
+        + f". {or_missing(_to_gap, seen)}",
     )
 
 
@@ -134,7 +135,7 @@ def tightness(seen: Evidence) -> Finding:
         f"where {_active(seen, 0.2):.0%} of the limits are active at 20%, "
         f"{_active(seen, 0.001):.0%} at 0.1%.",
         f"Times in motion: {_by_solver(times[MOVING])}; from rest: {_by_solver(times[FROM_REST])}."
-        f"{loads(timed)} {aside(_larger, seen)}",
+        f"{loads(timed)} {or_missing(_larger, seen)}",
     )
 
 
@@ -196,7 +197,7 @@ def directions(seen: Evidence) -> Finding:
         + f".{guess if of_3n > HARDLY else ''}",
         "Iterations, "
         + "; ".join(f"at {name}: {_by_solver(by, '.1f')}" for name, by in counts.items())
-        + f". {aside(_elsewhere, seen)}",
+        + f". {or_missing(_elsewhere, seen)}",
     )
 
 

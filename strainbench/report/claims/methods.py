@@ -7,7 +7,8 @@ import pandas as pd
 from strainbench.report.claims.claim import Finding, Verdict, at, claim
 from strainbench.report.claims.evidence import Evidence, NotThereError
 from strainbench.report.claims.projection import FIELD, FRAMES, ON_FRAMES
-from strainbench.report.claims.reading import aside, loads, time_over
+from strainbench.report.claims.reading import loads, time_over
+from strainbench.report.claims.sides import or_missing
 from strainbench.report.measures import COUNT, OPTIMAL, VIOLATED, digits, length
 from strainbench.report.names import settings
 from strainbench.report.numbers import power
@@ -71,7 +72,7 @@ def coupling(seen: Evidence) -> Finding:
         + f".{loads([fast, local])} They stop {length(1000 * fast['distance_max'])} (fast) and "
         f"{length(1000 * local['distance_max'])} from the projection (frames 14 to 22). At a mass "
         f"ratio of 1e4 fast projection is {hard['ending']} ({hard['why']}).",
-        aside(_equally_far, seen),
+        or_missing(_equally_far, seen),
     )
 
 
@@ -213,8 +214,8 @@ def admm(seen: Evidence) -> Finding:
         Verdict.of(found["ending"] == OPTIMAL),
         f"ADMM ends {found['ending']}, {length(1000 * found['distance_max'])} from the optimum, in "
         f"{found['time'] / ours['time']:.1f} times Clarabel's time.{loads([found, ours])} "
-        f"{aside(_more_directions, seen)}",
-        aside(_to_gap, seen),
+        f"{or_missing(_more_directions, seen)}",
+        or_missing(_to_gap, seen),
     )
 
 

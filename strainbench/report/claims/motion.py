@@ -6,7 +6,7 @@ import pandas as pd
 
 from strainbench.report.claims.claim import Finding, Verdict, at, claim
 from strainbench.report.claims.evidence import Evidence, NotThereError
-from strainbench.report.claims.reading import aside
+from strainbench.report.claims.sides import or_missing
 from strainbench.report.measures import COUNT
 from strainbench.report.numbers import power
 
@@ -50,7 +50,7 @@ def smooth(seen: Evidence) -> Finding:
         Verdict.of(worst <= AS_SMOOTH, tight <= AS_SMOOTH),
         f"Change of acceleration in a step over acceleration, root mean squares: {free:.2f} "
         f"without limits, {_by_limit(by, '.2f')}. {_rougher(by, free)}",
-        aside(_shorter, seen),
+        or_missing(_shorter, seen),
     )
 
 
@@ -122,7 +122,7 @@ def buckles(seen: Evidence) -> Finding:
         + "; ".join(
             f"{n} cells {_shares(of)}" for n, of in rows.groupby("resolution") if n != sizes[-1]
         )
-        + f". {aside(_least, seen)}",
+        + f". {or_missing(_least, seen)}",
     )
 
 
@@ -169,7 +169,7 @@ def chainmail(seen: Evidence) -> Finding:
         )
         + (f"; not measured yet: {', '.join(missing)}" if missing else "")
         + ".",
-        aside(_beyond, seen),
+        or_missing(_beyond, seen),
     )
 
 

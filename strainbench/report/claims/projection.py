@@ -7,7 +7,8 @@ import pandas as pd
 
 from strainbench.report.claims.claim import Finding, Verdict, at, claim
 from strainbench.report.claims.evidence import Evidence, NotThereError
-from strainbench.report.claims.reading import aside, tally
+from strainbench.report.claims.reading import tally
+from strainbench.report.claims.sides import or_missing
 from strainbench.report.local import local_table
 from strainbench.report.measures import NO_ANSWER, OPTIMAL, VIOLATED, length
 from strainbench.report.numbers import power
@@ -77,7 +78,7 @@ def not_convex(seen: Evidence) -> Finding:
         Verdict.of(admissible and between < least),
         f"An edge and its reverse keep a lower limit of {least:g}; half way between them its "
         f"length is {between:g}.",
-        aside(_local_optima, seen),
+        or_missing(_local_optima, seen),
     )
 
 
@@ -111,8 +112,8 @@ def _local_optima(seen: Evidence) -> str:
 def cone_program(seen: Evidence) -> Finding:
     """Eq. 12 to the letter beside the same cones with a quadratic objective."""
     literal, ours = (seen.one(FIELD, solver=s) for s in ("clarabel-paper", "clarabel"))
-    rest = aside(_from_rest, seen)
-    other = " ".join(aside(tell, seen) for tell in (_about_target, _far))
+    rest = or_missing(_from_rest, seen)
+    other = " ".join(or_missing(tell, seen) for tell in (_about_target, _far))
     return Finding(
         Verdict.of(literal["ending"] == OPTIMAL, literal["max_violation"] <= 1e-6),
         f"Equal in exact arithmetic. In motion (frames 14 to 22) Eq. 12 to the letter violates "
@@ -204,7 +205,7 @@ def any_solver(seen: Evidence) -> Finding:
     return Finding(
         Verdict.of(bool(optimal.all()), bool(len(interior) and interior.all())),
         f"Out of the box (`-default`), or scaled: {'; '.join(said)}. {_first_order(cells)}".strip(),
-        aside(_said_solved, seen),
+        or_missing(_said_solved, seen),
     )
 
 
@@ -247,9 +248,9 @@ def _said_solved(seen: Evidence) -> str:
 def any_limits(seen: Evidence) -> Finding:
     """Certified drapes within three curves."""
     solvers = ("newton-ipm", "clarabel")
-    kept = {n: _drapes(seen.cells("drape", solver=solvers, resolution=n)) for n in (30, 60)}
-    told = "; ".join(f"at {n} cells {', '.join(of)}" for n, of in kept.items())
-    whole = [all("optimal" in said for said in of) and len(of) == 3 for of in kept.values()]
+    cells = {n: seen.cells("drape", solver=solvers, resolution=n) for n in (30, 60)}
+    told = "; ".join(f"at {n} cells {_drapes(of)}" for n, of in cells.items())
+    whole = [of.loc[of["ending"] == OPTIMAL, "shape"].nunique() == 3 for of in cells.values()]
     return Finding(
         Verdict.of(all(whole), any(whole)),
         f"{told[0].upper()}{told[1:]}.",
@@ -257,17 +258,14 @@ def any_limits(seen: Evidence) -> Finding:
     )
 
 
-def _drapes(cells: pd.DataFrame) -> list[str]:
+def _drapes(cells: pd.DataFrame) -> str:
     """What became of each curve by each solver; a failure of one is not one of the program."""
-    found = []
-    for shape, of in cells.groupby("shape", sort=False):
-        ends = zip(of["solver"], of["ending"], of["max_violation"], of["distance_max"], strict=True)
-        told = (
-            f"{solver} {ending} (violation {power(v)}, {length(1000 * far)} from the projection)"
-            for solver, ending, v, far in ends
-        )
-        found.append(f"{shape}: {' and '.join(told)}")
-    return found
+    ends = [
+        f"{row.shape}: {row.solver} {row.ending} (violation {power(row.max_violation)}, "
+        f"{length(1000 * row.distance_max)} from the projection)"
+        for row in cells.sort_values("shape", kind="stable").itertuples()
+    ]
+    return ", ".join(ends)
 
 
 @claim(

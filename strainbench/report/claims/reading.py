@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import pandas as pd
 
@@ -12,14 +12,6 @@ from strainbench.report.claims.evidence import Evidence, NotThereError
 TALLIED = ("optimal", "feasible", "violated", "no answer", "solved, but violated", "refused")
 """Columns of certificates/tally.md."""
 UNLIKE_LOADS = 0.3  # cores
-
-
-def aside(tell: Callable[[Evidence], str], seen: Evidence) -> str:
-    """What another side says, or which of its numbers are missing."""
-    try:
-        return tell(seen)
-    except NotThereError as missing:
-        return f"Not measured yet: {missing}."
 
 
 def tally(seen: Evidence) -> pd.DataFrame:

@@ -8,7 +8,8 @@ from strainbench.report.claims.claim import Finding, Verdict, claim
 from strainbench.report.claims.evidence import Evidence
 from strainbench.report.claims.methods import BASIC_HARD
 from strainbench.report.claims.projection import CONES, ended
-from strainbench.report.claims.reading import aside, tally
+from strainbench.report.claims.reading import tally
+from strainbench.report.claims.sides import or_missing
 from strainbench.report.measures import COUNT, OPTIMAL
 from strainbench.report.versions import NOT_INSTALLED
 
@@ -52,7 +53,7 @@ def robust(seen: Evidence) -> Finding:
         f"On the hard cases of `stress` that some method solves: {told}.{_beyond(asked)}"
         + (f" Not measured yet: {', '.join(missing)}." if missing else "")
         + _unsolved(ours[~solved[ours.index]]),
-        aside(_random_problems, seen),
+        or_missing(_random_problems, seen),
     )
 
 

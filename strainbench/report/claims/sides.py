@@ -10,10 +10,10 @@ from strainbench.report.claims.evidence import Evidence, NotThereError
 from strainbench.report.energy import unsteadiness
 
 
-def or_missing(measure: Callable[[], str]) -> str:
-    """What it says, or which of its numbers are missing."""
+def or_missing(measure: Callable[..., str], *seen: Evidence) -> str:
+    """What it says of the evidence, or which of its numbers are missing."""
     try:
-        return measure()
+        return measure(*seen)
     except NotThereError as missing:
         return f"Not measured yet: {missing}."
 
