@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from solvers.newton_ipm.drawn import Drawn
 from solvers.newton_ipm.exact import ExactCones
 from solvers.newton_ipm.matrix import Matrix
 from solvers.newton_ipm.mesh import Change, put, residual, take
@@ -53,6 +54,7 @@ class State:
         self.matrix = Matrix(problem)
         self.linear = best_linear_solver(self.matrix.lower)
         self.cones = CONES[type(problem.kind)](problem, self.matrix.slots)
+        self.drawn = Drawn(problem)
         self.snapshot: Snapshot | None = None
         self.cold_iterations = 0
         _ = problem.largest_objective  # its shortest paths are kept with the problem
@@ -84,10 +86,7 @@ class Iterate:
         self.infeasible = False
         self.x = problem.target
         self.cones.place(problem.bounds, self.x)
-        self.y_target, self.violations = (
-            self.cones.at.y.copy(),
-            np.maximum(self.cones.excess(), 0.0),
-        )
+        self.y_target = self.cones.at.y.copy()
 
     def begin(self) -> bool:
         """Resume where a snapshot is kept and there is one, else start; which of them it was."""
@@ -99,13 +98,15 @@ class Iterate:
         return resumed
 
     def start(self) -> None:
-        """From the target, with products of a guess: the violation over the size of the mesh."""
+        """From the target or nearer, with products of a guess: violation over the mesh's size."""
         problem = self.problem
-        size = problem.edge_length * np.sqrt(len(problem.used))
-        far = size * np.sqrt(np.mean(self.violations**2))
-        guess = 0.5 * far**2 * float(np.sum(problem.weights[self.free]))
-        self.x = self.target
+        self.cones.place(problem.bounds, self.target)
+        self.x = self.state.drawn.start(self.target, float(self.cones.excess().max()))
         self.cones.place(problem.bounds, self.x)
+        size = problem.edge_length * np.sqrt(len(problem.used))
+        far = size * np.sqrt(np.mean(np.maximum(self.cones.excess(), 0.0) ** 2))
+        guess = 0.5 * far**2 * float(np.sum(problem.weights[self.free]))
+        guess += problem.objective(self.x)
         self.cones.start(FLOOR, FIRST_MU * guess / self.cones.degree)
 
     def resume(self) -> None:
