@@ -27,7 +27,7 @@ class Cvxpy(Solver):
     ||(G target + G W z)_i|| <= b_i, where W z are the free vertices' displacements and
     W = (s M / 2)^(-1/2), s = 16 / edge^2 over the mean mass. With s = 1, Clarabel misses a gap
     of 1e-4 in early frames of the swing. Exact limits have a semidefinite cone an element, with
-    the backends that take them. G target and b are cvxpy parameters: the model is compiled once a
+    the backends that take them. The target is a cvxpy parameter: the model is compiled once a
     mesh, and a solve puts the numbers in and calls the backend.
 
     A solution's details tell the two apart: `backend_seconds`, in cvxpy's call of the backend,

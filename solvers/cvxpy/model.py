@@ -19,7 +19,11 @@ SCALING = 16.0  # of the objective in units of 1/edge^2 over the mean mass, as `
 
 
 class Model:
-    """The cvxpy problem of a mesh, its parameters, and how to read its solution."""
+    """The cvxpy problem of a mesh, its parameter, and how to read its solution.
+
+    cvxpy keeps a number for each pair of a parameter and a variable: with the target 2 GB at 60
+    cells of the swing, with G target and the bounds in its place more than 18.
+    """
 
     def __init__(self, problem: Problem, backend: str, scaled: bool) -> None:
         weights = problem.weights[problem.free]
@@ -29,24 +33,18 @@ class Model:
             self.scale = SCALING / (problem.edge_length**2 * float(weights.mean()))
         self.root = np.sqrt(0.5 * self.scale * weights)[:, None]
         self.z = cp.Variable((len(weights), 3))
-        self.stretched = cp.Parameter((problem.rows, 3))
-        self.bounds = cp.Parameter(problem.constraints, nonneg=True)
+        self.target = cp.Parameter((problem.vertices, 3))
         G = problem.G[:, problem.free] @ sp.diags_array(1 / self.root[:, 0])
-        y = self.stretched + G @ self.z
+        y = problem.G @ self.target + G @ self.z
         self.exact = problem.kind.cone == "semidefinite"
         self.compiler = "SCIPY" if self.exact else None  # the default has no stacks of matrices
         if self.exact:
-            self.cones = cp.PSD(matrices(problem, y, self.bounds))
+            self.cones = cp.PSD(matrices(problem, y))
         else:
-            self.cones = cp.SOC(self.bounds, y, axis=1)
+            self.cones = cp.SOC(problem.bounds, y, axis=1)
         self.problem = cp.Problem(cp.Minimize(cp.sum_squares(self.z)), [self.cones])
-        self.put(problem)
+        self.target.value = problem.target
         self.problem.get_problem_data(backend, canon_backend=self.compiler)
-
-    def put(self, problem: Problem) -> None:
-        """New numbers for the parameters."""
-        self.stretched.value = problem.G @ problem.target
-        self.bounds.value = problem.bounds
 
     def run(self, problem: Problem, options: dict[str, Any]) -> tuple[str, float]:
         """The status, and the seconds in the backend.
@@ -56,7 +54,7 @@ class Model:
         cvxpy's `warm_start` hands SCS the last frame's answer, so that solves would depend on
         their order, and makes QOCO 0.3 violate limits by a tenth.
         """
-        self.put(problem)
+        self.target.value = problem.target
         reuse = self.backend == "CLARABEL"  # its symbolic factorisation, nothing else
         data, chain, inverse = self.problem.get_problem_data(
             self.backend, canon_backend=self.compiler, solver_opts=options
@@ -94,7 +92,7 @@ class Model:
         return int(getattr(self.problem.solver_stats, "num_iters", None) or 0)
 
 
-def matrices(problem: Problem, y: Any, bounds: Any) -> Any:
+def matrices(problem: Problem, y: Any) -> Any:
     """(elements, k, k) [[b I, Y], [Y^T, b I]], Y (3 x dim) an element's rows of y as columns."""
     e, dim = problem.constraints, problem.rows // problem.constraints
     k = 3 + dim
@@ -110,4 +108,4 @@ def matrices(problem: Problem, y: Any, bounds: Any) -> Any:
     places = np.concatenate([upper.ravel(), lower.ravel()])
     of_y = scatter(places, np.tile(np.arange(3 * e * dim), 2), 3 * e * dim)
     of_b = scatter(diagonal.ravel(), np.repeat(np.arange(e), k), e)
-    return cp.reshape(of_y @ cp.vec(y, order="C") + of_b @ bounds, (e, k, k), order="C")
+    return cp.reshape(of_y @ cp.vec(y, order="C") + of_b @ problem.bounds, (e, k, k), order="C")
