@@ -6,11 +6,12 @@ numbers that come out the same again are known to be of the code as it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 
-from strainbench.bench.records import remember_machine
+from strainbench.bench.records import MACHINES, read_machines, remember_machine
 from strainbench.sources import PACKAGES, ROOT, SUITE, TELLING, digest
 
 CODE = "code"
@@ -18,20 +19,34 @@ ONLY_TELLS = ("chart.py", "report.py")
 """Files of studies that no number depends on."""
 
 
-def remember_study(folder: Path, study: str, machine: str, facts: Mapping[str, object]) -> None:
+def remember_study(
+    folder: Path, study: str, machine: str, facts: Mapping[str, object], file: str = ""
+) -> None:
     """Note a machine's facts in the folder of a study, with the digest of what it measured.
 
     Parameters
     ----------
-    study : its folder in strainbench/studies
+    study : its folder or module in strainbench/studies
+    file : what was written, where other files in the folder are measured on their own
     """
-    remember_machine(folder, machine, {**facts, CODE: {study: code_digest(study)}})
+    known = read_machines(folder).get(machine, {}) if (folder / MACHINES).exists() else {}
+    of_files = {name: made for name, made in _codes(known) if file and "/" in name}
+    code = {**of_files, f"{study}/{file}" if file else study: code_digest(study)}
+    remember_machine(folder, machine, {**facts, CODE: code})
 
 
 def made_with_this_code(machines: Mapping[str, Mapping[str, object]]) -> bool:
-    """Whether a study's digest, beside any of its machines, is that of the sources as they are."""
-    codes = [code for facts in machines.values() if isinstance(code := facts.get(CODE), Mapping)]
-    return any(made == code_digest(study) for code in codes for study, made in code.items())
+    """Whether all digests, each beside any machine, are those of the sources as they are."""
+    made = defaultdict[str, list[object]](list)
+    for facts in machines.values():
+        for name, code in _codes(facts):
+            made[name].append(code)
+    return bool(made) and all(code_digest(name.split("/")[0]) in of for name, of in made.items())
+
+
+def _codes(facts: Mapping[str, object]) -> Iterable[tuple[str, object]]:
+    codes = facts.get(CODE)
+    return codes.items() if isinstance(codes, Mapping) else ()
 
 
 @cache
@@ -48,5 +63,6 @@ def _sources() -> Iterator[Path]:
 def _counts(file: Path, study: str) -> bool:
     """Whether a file decides a study's numbers: none that only tells, and no other study."""
     room, *rest = file.relative_to(SUITE).parts if file.is_relative_to(SUITE) else ("",)
-    own = room == "studies" and study in rest[:1] and file.name not in ONLY_TELLS
+    named = room == "studies" and study == Path(rest[0]).stem
+    own = named and file.name not in ONLY_TELLS
     return own or room not in TELLING

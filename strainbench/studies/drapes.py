@@ -20,11 +20,10 @@ from scipy.spatial import cKDTree
 
 from strainbench.arrays import FloatArray, IntArray
 from strainbench.document import Table
-from strainbench.document.writers import csv
-from strainbench.files import open_folder, write_whole
+from strainbench.files import open_folder
 from strainbench.progress import Track, untracked
 from strainbench.scenario.registry import find_scenario
-from strainbench.studies.watched import watched
+from strainbench.studies.program import watched, write_table
 
 SHAPES = ("isotropic", "orthotropic", "anisotropic")
 HEADER = ("shape", "resolution", "other", "other_resolution", "hausdorff")
@@ -92,7 +91,7 @@ def run(
         found = distances([int(word) for word in words], watched)
     except (ValueError, ArithmeticError) as error:
         raise SystemExit(f"strainbench.studies.drapes: {error}") from None
-    write_whole(output / FILE, csv(Table("", list(HEADER), found)).encode())
+    write_table(output / FILE, "drapes", "Distances of drapes", Table("", list(HEADER), found))
     print(f"wrote {output / FILE}")
 
 

@@ -11,8 +11,6 @@ OMP_NUM_THREADS=1 keeps each on one core.
 
 from __future__ import annotations
 
-import shlex
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -24,22 +22,20 @@ import typer
 from rich.console import Console
 
 from strainbench.arrays import FloatArray
-from strainbench.bench.machine import describe_machine
-from strainbench.document import Code, Column, Document, Table
+from strainbench.document import Column, Table
 from strainbench.document.writers import terminal
 from strainbench.physics.cloth import Cloth
 from strainbench.physics.implicit_euler import NewtonReport, NewtonSettings, minimise_step
 from strainbench.physics.integrators import Motion, Project, step_and_project
 from strainbench.physics.linear import LinearSolver, available_linear_solvers
 from strainbench.progress import Track, untracked
-from strainbench.report.machine import machine_section
-from strainbench.report.output import check_ending, write_output
+from strainbench.report.output import check_ending
 from strainbench.scenario.cloth import ClothScenario
 from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.stage import Stage
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solver
-from strainbench.studies.watched import watched
+from strainbench.studies.program import watched, write_table
 
 HEADER = (
     *("solver", "converged", "iterations", "factor.", "evaluations", "step [ms]"),
@@ -159,11 +155,7 @@ def run(
     found = table(measured, title)
     Console(width=150).print(terminal(found))
     if output is not None:
-        machine, facts = describe_machine(threads=1)
-        command = shlex.join(["python", "-m", "strainbench.studies.euler", *sys.argv[1:]])
-        about = machine_section({machine: facts})
-        title = "Where implicit Euler's time goes"
-        write_output(output, Document(title, [Code(command), found, about]), found)
+        write_table(output, "euler", "Where implicit Euler's time goes", found)
 
 
 if __name__ == "__main__":

@@ -15,8 +15,6 @@ plays each combination of settings with each solver, unjudged, and tells from po
 
 from __future__ import annotations
 
-import shlex
-import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -28,17 +26,15 @@ from rich.console import Console
 
 from strainbench.arrays import FloatArray
 from strainbench.bench.cell import Cell
-from strainbench.bench.machine import describe_machine
 from strainbench.bench.plan import plan
-from strainbench.document import Code, Column, Document, Table
+from strainbench.document import Column, Table
 from strainbench.document.writers import terminal
 from strainbench.referee.motion import jitter
 from strainbench.render.polar import ANGLES, directional_stretches
-from strainbench.report.machine import machine_section
-from strainbench.report.output import check_ending, write_output
+from strainbench.report.output import check_ending
 from strainbench.scenario.scenario import Scenario
 from strainbench.scenario.stage import Stage, StageError
-from strainbench.studies.watched import watched
+from strainbench.studies.program import watched, write_table
 
 
 @dataclass(frozen=True)
@@ -123,10 +119,7 @@ def run(
     found = table(rows)
     Console(width=200).print(terminal(found))
     if output is not None:
-        machine, facts = describe_machine(threads=1)
-        command = shlex.join(["python", "-m", "strainbench.studies.looks", *sys.argv[1:]])
-        about = machine_section({machine: facts})
-        write_output(output, Document("Looks of motions", [Code(command), found, about]), found)
+        write_table(output, "looks", "Looks of motions", found)
 
 
 if __name__ == "__main__":

@@ -117,12 +117,27 @@ def test_a_study_that_keeps_the_digest_of_what_it_measured_needs_no_history(tmp_
     assert age(tmp_path) == ["not known: its numbers stand in no history"]
 
 
+def test_each_file_of_a_study_has_its_digest(tmp_path):
+    machine, facts = describe_machine(1)
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("a\n1\n")
+        remember_study(tmp_path, "looks", machine, facts, name)
+    assert age(tmp_path) == []
+    code = {"looks/a.csv": code_digest("ledger"), "looks/b.csv": code_digest("looks")}
+    remember_machine(tmp_path, machine, facts | {CODE: code})
+    assert age(tmp_path) == ["not known: its numbers stand in no history"]
+    remember_study(tmp_path, "looks", machine, facts, "a.csv")
+    assert age(tmp_path) == []
+
+
 def test_the_digest_of_a_study_is_of_what_it_measures():
     assert code_digest("step") != code_digest("ledger")
     assert _counts(SUITE / "studies/step/measure.py", "step")
     assert not _counts(SUITE / "studies/ledger/measure.py", "step")
     assert not _counts(SUITE / "studies/step/report.py", "step")
     assert not _counts(SUITE / "report/table.py", "step")
+    assert _counts(SUITE / "studies/looks.py", "looks")
+    assert not _counts(SUITE / "studies/looks.py", "drapes")
     assert _counts(SUITE / "bench/runner.py", "step")
     assert _counts(SUITE.parent / "solvers/clarabel.py", "step")
 
