@@ -9,8 +9,9 @@ from math import nan
 import pytest
 
 from strainbench.bench.columns import RUN_COLUMNS
-from strainbench.bench.records import RUNS, read_rows
+from strainbench.bench.records import RUNS, STEPS, read_rows
 from strainbench.cli.stability import parse_budget
+from strainbench.report.freshness import age
 from strainbench.studies.stability.axis import Axis
 from strainbench.studies.stability.measure import Map, Spot
 from strainbench.studies.stability.report import sentences
@@ -58,6 +59,10 @@ def test_a_map_is_made_and_goes_on(tmp_path):
         assert len(read_rows(tmp_path / "out" / RUNS, RUN_COLUMNS)) == len(rows)
         assert "gentle holds from limit" in again
         assert (tmp_path / "out" / "map.csv").read_bytes() == whole
+    assert age(tmp_path / "out") == []
+    for table in (RUNS, STEPS):
+        (tmp_path / "out" / table).unlink()
+    assert age(tmp_path / "out") == []
 
 
 def spot(ending):

@@ -6,11 +6,14 @@ from collections import Counter
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
+from strainbench.bench.machine import describe_machine
 from strainbench.document import Column, Document, Prose, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import write_whole
 from strainbench.report.charts import Target, draw, draw_sheet
 from strainbench.report.measures import COUNT, NO_ANSWER, OPTIMAL, OUT_OF_TIME, SIGNS
+from strainbench.report.provenance import remember_study
+from strainbench.report.versions import shown_runs
 from strainbench.studies.stability.chart import key_chart, map_chart
 from strainbench.studies.stability.measure import Map, Spot
 from strainbench.studies.stability.refine import Point
@@ -33,7 +36,13 @@ CELLS = (
 
 
 def write_map(found: Map, title: str, command: str, folder: Path) -> list[Path]:
-    """map.md, map.csv, map-METHOD.svg and .pdf, and all of them on one sheet, map.png."""
+    """map.md, map.csv, map-METHOD.svg and .pdf, and all of them on one sheet, map.png.
+
+    Where no row is older than the sources, machines.json has their digest: a map is kept without
+    its rows.
+    """
+    if not any(row["older"] for row in shown_runs(folder)):
+        remember_study(folder, "stability", *describe_machine(threads=1))
     texts = {
         "map.md": markdown(as_document(found, title, command)),
         "map.csv": csv(Table("", CELLS, list(_cells(found)))),
