@@ -28,12 +28,17 @@ COUNT = (OPTIMAL, FEASIBLE)
 """Those of which times and distances count."""
 SIGNS = {OPTIMAL: "✓", FEASIBLE: "○", VIOLATED: "✗", OUT_OF_TIME: "✗", NO_ANSWER: "✗"}
 STEPS = ("steps_asked", "steps_done")
-READ = ("cell", "step", "outcome", "status", "seconds", "seconds_each", "active_constraints")
+PHYSICS = ("newton_iterations", "newton_converged")
+READ = (
+    *("cell", "step", "outcome", "status", "seconds", "seconds_each", "active_constraints"),
+    *PHYSICS,
+)
 ASKED = (
     *("cell", "outcome", "reason", "max_violation", *STEPS),
     *("solve_seconds_median", "solve_seconds_mean"),
 )
 """Columns of steps, and of runs, that measures are taken of."""
+STUCK = "its motion is stuck"
 MANY_TIMES = 1e5
 NEW = ("ending", "done", "astray", "why", "time", "time_low", "time_high", "time_count")
 """Columns that `measured` adds."""
@@ -91,15 +96,20 @@ def numbers(steps: pd.DataFrame) -> pd.DataFrame:
     return steps.assign(**parsed)
 
 
+def stuck(steps: pd.DataFrame) -> pd.Series[bool]:
+    """Where the physics failed before its first iteration: the cloth stays where it was left."""
+    iterations, converged = (steps.get(name, pd.Series("", steps.index)) for name in PHYSICS)
+    return (iterations == 0) & (converged.astype(str) == "False")
+
+
 def projections(steps: pd.DataFrame) -> pd.DataFrame:
-    """Those that had something to do: with active constraints at the optimum."""
-    return steps[steps["active_constraints"] > 0]
+    """Those that had something to do: with active constraints at the optimum, and not `stuck`."""
+    return steps[(steps["active_constraints"] > 0) & ~stuck(steps)]
 
 
 def timing(steps: pd.DataFrame) -> Quartiles:
     """Seconds a projection, over those that had something to do, all repeats of each."""
-    had = zip(every_time(steps), steps["active_constraints"], strict=True)
-    return Quartiles.of(s for each, active in had if active > 0 for s in each)
+    return Quartiles.of(s for each in every_time(projections(steps)) for s in each)
 
 
 def every_time(steps: pd.DataFrame) -> list[list[float]]:
@@ -112,7 +122,8 @@ def every_time(steps: pd.DataFrame) -> list[list[float]]:
 
 
 def finish(run: Row, steps: pd.DataFrame) -> Finish:
-    """How a cell ended; a projection that the clock cut off is no violation.
+    """How a cell ended; a projection that the clock cut off is no violation, a motion that is
+    `stuck` no answer.
 
     Parameters
     ----------
@@ -120,6 +131,9 @@ def finish(run: Row, steps: pd.DataFrame) -> Finish:
     """
     asked, done = (0 if pd.isna(run[name]) else int(run[name]) for name in STEPS)
     if run["outcome"] in COUNT:
+        still = steps.loc[stuck(steps), "step"]
+        if len(still):
+            return Finish(NO_ANSWER, int(still.min()) - 1, asked, STUCK)
         return Finish(run["outcome"], done, asked)
     said = list(zip(steps["step"], steps["outcome"], steps["status"], strict=True))
     failed = {step for step, outcome, _ in said if outcome not in COUNT}

@@ -45,6 +45,16 @@ def test_a_free_frame_does_not_make_a_method_fast():
     assert timing(steps(FREE, FIRST, SECOND)) == pytest.approx((0.15, 0.125, 0.175, 2))
 
 
+def test_a_cloth_that_cannot_move_on_makes_no_method_fast():
+    """Its candidates are what the last projection left, which takes no time to project."""
+    still = (3, "feasible", "solved", 0.001, 9)
+    found = steps(FREE, FIRST, still).assign(
+        newton_iterations=[4.0, 23.0, 0.0], newton_converged=["True", "False", "False"]
+    )
+    assert timing(found).median == pytest.approx(0.1)
+    assert finish(run("feasible"), found) == Finish("no answer", 2, 3, "its motion is stuck")
+
+
 def test_without_anything_to_project_there_is_no_time():
     nothing = timing(steps(FREE))
     assert isnan(nothing.median)

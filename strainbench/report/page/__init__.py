@@ -16,7 +16,7 @@ from strainbench.escape import plain
 from strainbench.progress import Track, untracked
 from strainbench.report.charts import Makers
 from strainbench.report.identity import look
-from strainbench.report.measures import OPTIMAL, numbers
+from strainbench.report.measures import OPTIMAL, PHYSICS, numbers
 from strainbench.report.names import percent, played
 from strainbench.report.page import data
 from strainbench.report.page.drawn import Drawn
@@ -34,7 +34,7 @@ HERE = Path(__file__).parent
 READ = (
     *("cell", "step", "projection", "outcome", "status", "seconds", "active_constraints"),
     *("max_violation", "relative_gap", "distance", "contact_energy"),
-    *("seconds_low", "seconds_high", "seconds_each"),
+    *("seconds_low", "seconds_high", "seconds_each", *PHYSICS),
 )
 """Columns of steps that the page is about; further ones would cost time."""
 BLOCK = list(CASE[:-1])
