@@ -87,6 +87,7 @@ PATIENCE = 25  # iterations after which a warm start is given up
 WIDTHS = 2e-8, 1e-10, 1e-12, 1e-13  # of wider limits; below, slacks are rounding
 FAR = 1e-7  # errors below are rounding's: no other way out is tried
 STALL, JAM = 12, 30  # iterations without progress, below an error of 1e-3 and above
+NEARER = 0.999  # of the violation: without an interior the gap may grow for longer
 ROUGH, ROUGH_ITERATIONS = 0.1, 40  # of projections onto wider limits
 
 
@@ -99,8 +100,8 @@ class NewtonIPM(Solver):
     | solved | violation and relative gap are below the tolerance, as the referee measures them |
     | infeasible | the dual bound exceeds the objective of any point within the limits, or the \
 pins alone are too far apart |
-    | stalled | rounding: the larger of both did not fall in 12 iterations (30 far from the \
-optimum), or K has no factor any more; the best iterate is returned |
+    | stalled | rounding: neither got better in 12 iterations (30 far from the optimum), or K has \
+no factor any more; the best iterate is returned |
     | stalled: limits without an interior | wider limits are solved, these not to the tolerance: \
 multipliers have no bound, and the referee's may price a violation higher than the answer's own |
     | iteration limit, time limit | neither of these before |
@@ -191,7 +192,7 @@ multipliers have no bound, and the referee's may price a violation higher than t
         """Steps 2 to 6; and the least error, which is the solution's."""
         iterate = Iterate(problem, state, warm, tolerance)
         warm = resumed = iterate.begin()
-        best, best_at, kept = np.inf, 0, None
+        best, best_at, kept, least = np.inf, 0, None, np.inf
         status = "iteration limit"
         for k in range(self.max_iterations + 1):
             with section("measure"):
@@ -200,6 +201,8 @@ multipliers have no bound, and the referee's may price a violation higher than t
                 monitor(iterate.x, iterate.Y)
             if error < best:
                 best, best_at, kept = error, k, (iterate.x, iterate.Y)
+            if max(0.0, iterate.violation) < NEARER * least:
+                least, best_at = iterate.violation, k
             if error <= tolerance:  # 2
                 state.compare(k, resumed)
                 return Solution(iterate.x, "solved", k, iterate.Y), error

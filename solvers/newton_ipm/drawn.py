@@ -12,6 +12,7 @@ from strainbench.arrays import FloatArray
 from strainbench.physics.linear import LinearSolver, best_linear_solver
 
 FAR_OFF = 1.0  # violation from which on a candidate is no start
+LOST = 1 / np.finfo(float).eps  # and beyond which its rounding is longer than the limits
 TIE = 1e-10  # to the candidate, of the mean diagonal: for parts of a mesh without a pin
 
 
@@ -43,14 +44,17 @@ class Drawn:
         return TIE * float(np.mean(self._free.power(2).sum(axis=0)))
 
     def start(self, target: FloatArray, violation: float) -> FloatArray:
-        """(n, 3), violated by FAR_OFF more than the drawn mesh is at most; the target if it is.
+        """(n, 3), violated by FAR_OFF more than the drawn mesh at most; or the target.
+
+        The target is the start where it is violated by no more than that, and where so much that
+        no bound on the objective could tell limits that can be met from others.
 
         Parameters
         ----------
         violation : largest of the target
         """
         x = target.copy()
-        if violation > FAR_OFF:
+        if FAR_OFF < violation < LOST:
             free, kept = self._problem.free, target.copy()
             kept[free] = 0.0
             pull = self._free.T @ (self._problem.G @ kept)

@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.drape import Drape
 from solvers.newton_ipm import Iterate, NewtonIPM, State
-from solvers.newton_ipm.drawn import FAR_OFF, Drawn
+from solvers.newton_ipm.drawn import FAR_OFF, LOST, Drawn
 from strainbench import Problem, StretchLimits, certify, solve
 from strainbench.problem.grid import square_grid
 from strainbench.referee.reference import Reference
@@ -468,7 +468,7 @@ def test_a_candidate_far_away_is_started_nearer():
 @pytest.mark.parametrize("pins", ["two", "one", "none"])
 def test_a_start_is_between_the_candidate_and_a_mesh_drawn_together(pins, kind):
     problem = sheet(kind, 1e-2, lambda x, rng: 30 * x, pins)
-    drawn = Drawn(problem).start(problem.target, np.inf)
+    drawn = Drawn(problem).start(problem.target, 0.99 * LOST)
     x = Drawn(problem).start(problem.target, float(problem.violations(problem.target).max()))
     assert np.array_equal(x[problem.held], problem.target[problem.held])
     pull, before = (
@@ -478,8 +478,18 @@ def test_a_start_is_between_the_candidate_and_a_mesh_drawn_together(pins, kind):
     assert problem.violations(x).max() < FAR_OFF + problem.violations(drawn).max()
 
 
-def test_a_candidate_near_the_limits_is_the_start():
+@pytest.mark.parametrize("violation", [0.1, FAR_OFF, 1e17, np.inf, np.nan])
+def test_a_candidate_near_the_limits_or_lost_to_rounding_is_the_start(violation):
     problem = sheet("sampled", 1e-2)
-    violation = float(problem.violations(problem.target).max())
-    assert 0 < violation < FAR_OFF
     assert np.array_equal(Drawn(problem).start(problem.target, violation), problem.target)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("pins", ["two", "one", "none"])
+@pytest.mark.parametrize("power", [2, 4, 8, 12, 15, 17, 20, 60, 140])
+def test_limits_that_can_be_met_are_never_called_infeasible(power, pins, kind):
+    problem = sheet(kind, 1e-2, lambda x, rng: 10.0**power * x, pins)
+    found = answer(problem)
+    if power < (6 if pins == "none" else 14):
+        assert found.status == "solved"
+    assert not found.status.startswith("infeasible")
