@@ -35,8 +35,8 @@ steps done{error}; iterations are their mean.
 ✓ optimal on every step: violation at most {violation}, relative gap at most {gap}; ○ within the
 limits on every step, but not the projection; ✗ what went wrong: out of time, 7 of 8:
 so many steps were done before the clock ended the cell, or its last projection; a motion is stuck
-where implicit Euler can take no step from what a projection left. Numbers in brackets
-are of such a cell and do not count. **Bold**: the fastest that is optimal."""
+where the physics can take no step from what a projection left. Numbers in brackets are of such a
+cell and do not count. **Bold**: the fastest that is optimal."""
 CERTIFIED = """,
 itself certified to within {error:.1g} mm or, for most cells, better: `<` is said of a distance
 that is smaller than what its own cell's reference is certified to"""
