@@ -9,6 +9,7 @@ PAPER  ?= $(LOCAL)/paper
 FIELD  ?= $(LOCAL)/field
 FAILURES ?= $(LOCAL)/failures
 DIRECTIONS ?= $(LOCAL)/directions
+CERTIFICATES ?= $(LOCAL)/certificates
 HARD   := --set resolution=10 --time-limit 20 --results $(FAILURES)
 TESTS  := $(BIN)/python -m pytest -q --numprocesses=2 --dist=loadgroup
 TABLE1 := --solver newton-ipm,clarabel,clarabel-default,clarabel-paper,cvxpy,ipopt,ipopt-default,ipopt-default-lbfgs \
@@ -63,7 +64,8 @@ directions: setup ## what sampled directions cost, and how far the true stretch 
 	$(BIN)/strainbench report --results $(DIRECTIONS)
 
 certificates: setup ## 200 random problems with all solvers: no certificate contradicted; an hour
-	$(BIN)/python -m pytest -q tests/referee/test_certificates.py --problems 200
+	$(BIN)/python -m pytest -q tests/referee/test_certificates.py --problems 200 \
+		--tally $(CERTIFICATES)/tally.md
 
 test: setup ## the tests
 	$(TESTS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,6 +61,7 @@ def pytest_addoption(parser):
         help="check certificates on N random problems with all solvers, and print what became of "
         "the answers; by default 50 problems with a third of the solvers each",
     )
+    parser.addoption("--tally", type=Path, metavar="FILE", help="write it as Markdown, too")
     parser.addoption(
         "--kills",
         type=int,
@@ -119,6 +121,8 @@ def pytest_terminal_summary(terminalreporter, config):
         terminalreporter.section("certificates on random problems")
         for line in config.stash[TALLY].lines():
             terminalreporter.write_line(line)
+    if config.getoption("tally"):
+        config.stash[TALLY].write(config.getoption("tally"))
 
 
 @pytest.fixture

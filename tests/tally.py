@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
+from strainbench.bench.machine import describe_machine
 from strainbench.referee.certificate import OUTCOMES, Certificate
+from strainbench.report.machine import machine_line
+from strainbench.report.provenance import remember_study
 
 BROKEN = "solved, but violated"
 COLUMNS = (*OUTCOMES, BROKEN, "refused")
+TIME_LIMIT = 0.2  # [s] a solve
 
 
 @dataclass
@@ -47,3 +52,15 @@ class Tally:
         for name in sorted(self.answers):
             counts = (f"{self.answers[name][c]:{len(c)}}" for c in COLUMNS)
             yield "  ".join([name.ljust(width), *counts])
+
+    def write(self, file: Path) -> None:
+        """The table as Markdown, with command and machine; a digest of the code goes beside it."""
+        machine, facts = describe_machine(threads=1)
+        about = (
+            f"`make certificates CERTIFICATES={file.parent}`, {TIME_LIMIT:g} s a projection, on "
+            f"{machine_line(machine, facts)}"
+        )
+        title = f"# Certificates on {self.problems} random problems"
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("\n".join([title, "", about, "", "```text", *self.lines(), "```", ""]))
+        remember_study(file.parent, "certificates", machine, facts)

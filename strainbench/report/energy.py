@@ -10,7 +10,7 @@ import pandas as pd
 
 from strainbench.arrays import FloatArray
 from strainbench.document import Column, Prose, Table
-from strainbench.report.measures import OUT_OF_TIME
+from strainbench.report.measures import OUT_OF_TIME, STUCK
 from strainbench.report.names import CURVE_FILE, MESH_FILE, SPANNED, apart, cells, digits, settings
 from strainbench.report.rows import Row, rows_of
 from strainbench.report.steps import newest_steps
@@ -38,7 +38,7 @@ ENDED = "ended after"  # in the names of runs without an answer to the end
 def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """Total energy of every step of the simulated runs, in the order of the runs.
 
-    A step that the clock cut off is none. Columns: cell, panel and curve (what tells its panel and
+    A step that the clock cut off is none, nor is one of a motion that is stuck. Columns: cell, panel and curve (what tells its panel and
     its curve from others), time [s], energy [J].
     """
     simulated = runs[runs["mode"] == "simulate"]
@@ -48,8 +48,9 @@ def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     steps = steps.dropna(subset=["time", "kinetic_energy"]).drop_duplicates(
         ["cell", "step"], keep="last"
     )
-    late = simulated[simulated["ending"] == OUT_OF_TIME].set_index("cell")["done"]
-    steps = steps[steps["step"] <= steps["cell"].map(late).fillna(np.inf)]
+    early = (simulated["ending"] == OUT_OF_TIME) | (simulated["why"] == STUCK)
+    last = simulated[early].set_index("cell")["done"]
+    steps = steps[steps["step"] <= steps["cell"].map(last).fillna(np.inf)]
     names = _names(simulated)
     steps = steps.assign(order=steps["cell"].map({c: k for k, c in enumerate(names.index)}))
     steps = steps.sort_values(["order", "step"]).join(names, on="cell")

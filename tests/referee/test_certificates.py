@@ -2,7 +2,7 @@
 
 Each of 50 problems goes to every third solver, so that each solver has 16 or 17 of them.
 `pytest tests/referee/test_certificates.py --problems 200` checks 200 of them with all solvers, and
-prints what became of the answers; `make certificates` does that.
+prints what became of the answers, and with `--tally FILE` writes it; `make certificates` does that.
 """
 
 from __future__ import annotations
@@ -12,16 +12,17 @@ from dataclasses import replace
 import numpy as np
 
 from strainbench import certify, solve
+from strainbench.bench.records import read_machines
 from strainbench.referee.reference import reference_of
+from strainbench.report.provenance import made_with_this_code
 from strainbench.solver.registry import find_solver, list_solvers
 from tests.problems import random_problem
-from tests.tally import Tally
+from tests.tally import TIME_LIMIT, Tally
 
 NAMES = [e.name for e in list_solvers() if not e.unavailable]
 PROBLEMS = 50
 VIOLATION, GAP = 1e-6, 1e-4  # of an optimum, the referee's defaults
 EXACT_SHARE = 5  # one problem in so many has exact limits
-TIME_LIMIT = 0.2  # [s] a solve
 
 
 def pytest_generate_tests(metafunc):
@@ -105,7 +106,7 @@ def test_a_wrong_certificate_is_found():
     assert list(between({"a": (x, 1e-9), "b": (reference.positions, 1e-9)}))
 
 
-def test_the_tally_counts():
+def test_the_tally_counts_and_is_written(tmp_path):
     problem = random_problem(np.random.default_rng([2022, 1]))
     found = certify(problem, problem.target)
     counts = Tally()
@@ -122,3 +123,7 @@ def test_the_tally_counts():
         ["liar", "0", "0", "2", "0", "1", "0"],
         ["proud", "0", "0", "0", "0", "0", "1"],
     ]
+    written = tmp_path / "certificates" / "tally.md"
+    counts.write(written)
+    assert "\n".join(lines) in written.read_text()
+    assert made_with_this_code(read_machines(written.parent))

@@ -201,6 +201,13 @@ def test_a_scene_without_physics_has_no_energy_and_contact_counts(folder):
     assert energies(folder, load_runs(folder))["energy"].tolist() == pytest.approx([3e-3])
 
 
+def test_a_motion_that_is_stuck_ends_its_energies(folder):
+    about = {"cell": ROWS[1]["cell"], "kinetic_energy": 1e-3, "newton_converged": "False"}
+    steps = [about | {"step": k, "time": 0.1 * k, "newton_iterations": 3 - k} for k in (1, 2, 3)]
+    append_rows(folder / STEPS, STEP_COLUMNS, steps)
+    assert energies(folder, load_runs(folder))["time"].tolist() == pytest.approx([0.1, 0.2])
+
+
 def test_three_values_of_a_setting_make_a_sweep(tmp_path):
     swept = [
         row(s, limit=v, scenario_parameters=json.dumps({"limit": v, "resolution": 10}))
