@@ -205,7 +205,7 @@ def any_solver(seen: Evidence) -> Finding:
     return Finding(
         Verdict.of(bool(optimal.all()), bool(len(interior) and interior.all())),
         f"Out of the box (`-default`), or scaled: {'; '.join(said)}. {_first_order(cells)}".strip(),
-        or_missing(_said_solved, seen),
+        or_missing(_violated, seen),
     )
 
 
@@ -225,12 +225,15 @@ def _first_order(cells: pd.DataFrame) -> str:
     return "Interior points solve it; SCS, a first-order method, stops earlier."
 
 
-def _said_solved(seen: Evidence) -> str:
-    counts = tally(seen)["solved, but violated"]
-    default = {n: c for n, c in counts.items() if n in ("cvxpy-default", *OUT_OF_THE_BOX)}
-    default |= {n: c for n, c in counts.items() if n in FIRST_ORDER}
-    return "On 200 random problems (`make certificates`), said to be solved, but violated: " + (
-        ", ".join(f"{name} {count}" for name, count in default.items()) + "."
+def _violated(seen: Evidence) -> str:
+    """On how many random problems each stops beyond the limits, by its own test or the clock."""
+    names = ("cvxpy-default", *OUT_OF_THE_BOX, *FIRST_ORDER)
+    counts = tally(seen)
+    counts = counts[counts.index.isin(names)]
+    told = ", ".join(f"{name} {count}" for name, count in counts["violated"].items())
+    return (
+        f"On 200 random problems (`make certificates`), answers that violate the limits: {told}; of "
+        f"these {counts['solved, but violated'].sum()} are said to be solved."
     )
 
 
