@@ -38,8 +38,8 @@ ENDED = "ended after"  # in the names of runs without an answer to the end
 def energies(folder: Path, runs: pd.DataFrame) -> pd.DataFrame:
     """Total energy of every step of the simulated runs, in the order of the runs.
 
-    A step that the clock cut off is none, nor is one of a motion that is stuck. Columns: cell, panel and curve (what tells its panel and
-    its curve from others), time [s], energy [J].
+    A step that the clock cut off is none, nor is one of a motion that is stuck. Columns: cell,
+    panel and curve (what tells its panel and its curve from others), time [s], energy [J].
     """
     simulated = runs[runs["mode"] == "simulate"]
     steps = newest_steps(folder, simulated)[["cell", "step", "time", *PARTS]].copy()

@@ -232,8 +232,8 @@ def _violated(seen: Evidence) -> str:
     counts = counts[counts.index.isin(names)]
     told = ", ".join(f"{name} {count}" for name, count in counts["violated"].items())
     return (
-        f"On 200 random problems (`make certificates`), answers that violate the limits: {told}; of "
-        f"these {counts['solved, but violated'].sum()} are said to be solved."
+        f"On 200 random problems (`make certificates`), answers that violate the limits: {told}; "
+        f"of these {counts['solved, but violated'].sum()} are said to be solved."
     )
 
 
