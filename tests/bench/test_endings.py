@@ -47,10 +47,11 @@ def start(folder, rounds):
 
 def holds(run, folder):
     """Whether a run has begun: before, Python itself ends it, in its own words."""
-    holder = folder / HOLDER
-    return run.poll() is not None or (
-        holder.exists() and f"process {run.pid} " in holder.read_text(encoding="utf-8")
-    )
+    try:
+        holder = (folder / HOLDER).read_text(encoding="utf-8")
+    except FileNotFoundError:  # not yet, or no longer
+        holder = ""
+    return run.poll() is not None or f"process {run.pid} " in holder
 
 
 def check_rows(folder):
