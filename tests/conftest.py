@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strainbench.report.output import check_ending
 from tests.tally import Tally
 
 RUNNING = {
@@ -73,6 +74,11 @@ def pytest_addoption(parser):
 
 def pytest_configure(config):
     config.stash[TALLY] = Tally()
+    if file := config.getoption("tally"):
+        try:
+            check_ending(file)  # before an hour's work, not after it
+        except ValueError as error:
+            raise pytest.UsageError(str(error).replace("-o", "--tally", 1)) from None
 
 
 @pytest.hookimpl(tryfirst=True)  # xdist looks for groups after that

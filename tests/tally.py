@@ -10,6 +10,7 @@ from pathlib import Path
 from strainbench.bench.machine import describe_machine
 from strainbench.referee.certificate import OUTCOMES, Certificate
 from strainbench.report.machine import machine_line
+from strainbench.report.output import check_ending
 from strainbench.report.provenance import remember_study
 
 BROKEN = "solved, but violated"
@@ -61,6 +62,7 @@ class Tally:
             f"{machine_line(machine, facts)}"
         )
         title = f"# Certificates on {self.problems} random problems"
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_text("\n".join([title, "", about, "", "```text", *self.lines(), "```", ""]))
+        check_ending(file)
+        text = "\n".join([title, "", about, "", "```text", *self.lines(), "```", ""])
+        file.write_text(text, encoding="utf-8")
         remember_study(file.parent, "certificates", machine, facts)
