@@ -87,7 +87,8 @@ def age(folder: Path, commands: Sequence[str] = ()) -> list[str]:
         return [f"{count} of {len(rows)} cells {how}" for how, count in counts.items()]
     machines = read_machines(folder) if (folder / MACHINES).exists() else {}
     changes = dict.fromkeys(filter(None, map(changed_packages, machines.values())))
-    return [*([] if made_with_this_code(machines) else edits(folder, commands)), *changes]
+    fresh = made_with_this_code(machines, [path.name for path in folder.glob("*.csv")])
+    return [*([] if fresh else edits(folder, commands)), *changes]
 
 
 def edits(folder: Path, commands: Sequence[str] = ()) -> list[str]:

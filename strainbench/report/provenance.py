@@ -35,13 +35,23 @@ def remember_study(
     remember_machine(folder, machine, {**facts, CODE: code})
 
 
-def made_with_this_code(machines: Mapping[str, Mapping[str, object]]) -> bool:
-    """Whether all digests, each beside any machine, are those of the sources as they are."""
+def made_with_this_code(
+    machines: Mapping[str, Mapping[str, object]], files: Iterable[str] = ()
+) -> bool:
+    """Whether all digests, each beside any machine, are those of the sources as they are.
+
+    Parameters
+    ----------
+    files : of the folder, each of which needs one of its own where files were measured apart
+    """
     made = defaultdict[str, list[object]](list)
     for facts in machines.values():
         for name, code in _codes(facts):
             made[name].append(code)
-    return bool(made) and all(code_digest(name.split("/")[0]) in of for name, of in made.items())
+    apart = {name.partition("/")[2] for name in made}
+    if not made or ("" not in apart and set(files) - apart):
+        return False
+    return all(code_digest(name.split("/")[0]) in of for name, of in made.items())
 
 
 def _codes(facts: Mapping[str, object]) -> Iterable[tuple[str, object]]:

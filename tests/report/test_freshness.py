@@ -128,6 +128,8 @@ def test_each_file_of_a_study_has_its_digest(tmp_path):
     assert age(tmp_path) == ["not known: its numbers stand in no history"]
     remember_study(tmp_path, "looks", machine, facts, "a.csv")
     assert age(tmp_path) == []
+    (tmp_path / "c.csv").write_text("a\n1\n")
+    assert age(tmp_path) == ["not known: its numbers stand in no history"]
 
 
 def test_the_digest_of_a_study_is_of_what_it_measures():

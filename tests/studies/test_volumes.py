@@ -5,6 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
+from strainbench.report import provenance
+from strainbench.report.freshness import age
 from strainbench.studies.volumes import (
     cousin,
     fig4,
@@ -104,6 +106,18 @@ def test_what_a_folder_has_is_kept_and_told_in_the_plans_order(tmp_path, monkeyp
     assert said.count("fig4:") == 1
     assert "step_ms 40" in said
     assert pd.read_csv(tmp_path / "fig4.csv")["step_ms"].tolist() == [40, 20]
+
+
+def test_a_file_notes_the_sources_that_it_is_begun_with(tmp_path, monkeypatch):
+    monkeypatch.setattr(fig4, "KINDS", ("isotropic",))
+    written.main("40", "2", "fig4", tmp_path)
+    assert age(tmp_path) == []
+    monkeypatch.setattr(provenance, "code_digest", lambda study: "another")
+    written.main("40,20", "2", "fig4", tmp_path)
+    assert age(tmp_path) == ["not known: its numbers stand in no history"]
+    (tmp_path / "fig4.csv").unlink()
+    written.main("40", "2", "fig4", tmp_path)
+    assert age(tmp_path) == []
 
 
 def test_a_press_has_a_row_at_each_depth():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,10 +11,11 @@ import pandas as pd
 import typer
 
 from strainbench.bench.machine import describe_machine
-from strainbench.bench.records import open_folder, remember_machine
+from strainbench.bench.records import open_folder, read_machines, remember_machine
 from strainbench.document import Code, Document, Table
 from strainbench.document.writers import csv, markdown
 from strainbench.files import locked, write_whole
+from strainbench.report.provenance import remember_study
 from strainbench.studies.volumes import (
     beams,
     certificates,
@@ -96,16 +96,24 @@ def document(folder: Path, about: str, command: str) -> Document:
 
 
 def write(folder: Path, plan: Plan, parts: Sequence[str], command: str) -> None:
-    """Measure what the folder has not, and write rows and tables to it."""
+    """Measure what the folder has not, and write rows and tables to it.
+
+    A file that is begun notes the sources that it is measured with; one that goes on keeps its.
+    """
     open_folder(folder, "-o")
+    asked = [part for part in PARTS if part.name in parts]
     with locked(folder):
-        for part in PARTS:
-            if part.name in parts:
+        begun = [file for part in asked if not (file := folder / f"{part.name}.csv").exists()]
+        try:
+            for part in asked:
                 measured(part, plan, folder)
-        name, facts = describe_machine(1)
-        remember_machine(folder, name, facts)
-        machines = json.loads((folder / "machines.json").read_text(encoding="utf-8"))
-        told = document(folder, f"Measured on {', '.join(machines)}.", command)
+        finally:
+            name, facts = describe_machine(1)
+            if name not in read_machines(folder):
+                remember_machine(folder, name, facts)
+            for file in filter(Path.exists, begun):
+                remember_study(folder, "volumes", name, facts, file.name)
+        told = document(folder, f"Measured on {', '.join(read_machines(folder))}.", command)
         write_whole(folder / "volumes.md", markdown(told).encode())
 
 
