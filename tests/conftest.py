@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from strainbench.report.output import check_ending
+from strainbench.bench.records import open_folder
 from tests.tally import Tally
 
 RUNNING = {
@@ -75,10 +75,12 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     config.stash[TALLY] = Tally()
     if file := config.getoption("tally"):
+        if file.suffix != ".md":
+            raise pytest.UsageError(f"--tally {file}: a name that ends in .md is valid")
         try:
-            check_ending(file)  # before an hour's work, not after it
+            open_folder(file.parent, "--tally")  # before an hour's work, not after it
         except ValueError as error:
-            raise pytest.UsageError(str(error).replace("-o", "--tally", 1)) from None
+            raise pytest.UsageError(str(error)) from None
 
 
 @pytest.hookimpl(tryfirst=True)  # xdist looks for groups after that

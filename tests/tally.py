@@ -10,7 +10,6 @@ from pathlib import Path
 from strainbench.bench.machine import describe_machine
 from strainbench.referee.certificate import OUTCOMES, Certificate
 from strainbench.report.machine import machine_line
-from strainbench.report.output import check_ending
 from strainbench.report.provenance import remember_study
 
 BROKEN = "solved, but violated"
@@ -62,7 +61,6 @@ class Tally:
             f"{machine_line(machine, facts)}"
         )
         title = f"# Certificates on {self.problems} random problems"
-        check_ending(file)
         text = "\n".join([title, "", about, "", "```text", *self.lines(), "```", ""])
         file.write_text(text, encoding="utf-8")
         remember_study(file.parent, "certificates", machine, facts)

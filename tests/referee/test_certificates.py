@@ -123,7 +123,7 @@ def test_the_tally_counts_and_is_written(tmp_path):
         ["liar", "0", "0", "2", "0", "1", "0"],
         ["proud", "0", "0", "0", "0", "0", "1"],
     ]
-    written = tmp_path / "certificates" / "tally.md"
+    written = tmp_path / "tally.md"
     counts.write(written)
     assert "\n".join(lines) in written.read_text()
     assert made_with_this_code(read_machines(written.parent))
