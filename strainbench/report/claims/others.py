@@ -76,9 +76,9 @@ def _margins(seen: Evidence, solver: str) -> list[Margin]:
             ratio = seen.ratio(
                 PAPER, "solve_seconds_mean", {"solver": "clarabel"}, solver=solver, **where
             )
-            if not done.finished:
+            if not (count := done.finished):
                 continue
-            few = "" if one["done"] == done.asked else f", {done.finished} steps"
+            few = "" if one["done"] == done.asked else f", {count} step{'s' * (count != 1)}"
             told = f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.2g}"
             words = f"{told} ({n} cells, {100 * limit:g}%{few})"
             found.append(Margin(ratio, words, limit < 0.1 and n > 10))
