@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -208,6 +213,14 @@ def test_growth_counts_what_a_mesh_takes(monkeypatch):
     assert limited.count > 1
     assert limited.ratio > alone.ratio
     assert 0 <= alone.megabytes <= limited.megabytes
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="it is not known elsewhere")
+def test_memory_of_a_mesh_is_not_its_parents():
+    held = np.ones(40_000_000)  # 320 MB
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        child = pool.submit(growth._peak).result()
+    assert 10 < child < held.nbytes / 1e6 < growth._peak()
 
 
 def test_a_method_that_cannot_take_the_limits_plays_no_step():
