@@ -88,7 +88,7 @@ def _write_small(png: bytes, path: Path) -> None:
     from PIL import Image
 
     picture = Image.open(BytesIO(png)).convert("RGB")
-    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path)
+    picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
 
 
 def _seen(part: Any) -> Any:
