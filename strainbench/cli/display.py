@@ -59,7 +59,9 @@ def tracking() -> Iterator[Track]:
 
 @contextmanager
 def playing(cell: Work, frame: int) -> Iterator[Callable[[int], None]]:
-    """What shows how many projections a scene has asked for, on its way to `frame`."""
-    with progress() as bar:
+    """What shows how many projections a scene, on one thread, has asked for before `frame`."""
+    from strainbench.studies.threads import one_thread
+
+    with one_thread(), progress() as bar:
         task = bar.add_task(plain(f"playing {cell.title}"), total=max(frame - 1, 1))
         yield lambda asked: bar.update(task, completed=asked - 1)

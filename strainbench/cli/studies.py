@@ -147,14 +147,14 @@ def compare_steps(
     results: Folder = LOCAL / "step",
 ) -> None:
     """Compare closed loops with the motion whose steps are constrained whole: distances in mm."""
-    from strainbench.bench.machine import fixed_threads
     from strainbench.bench.plan import plan
     from strainbench.document.writers import terminal
     from strainbench.studies.step import measure, tables, write_distances
+    from strainbench.studies.threads import one_thread
 
     words = [as_decimals(word) for word in set_ or []]
     cells = plan([scenario], solver, words, "simulate", None, [tolerance], None, duration)
-    with fixed_threads(1), tracking() as track:
+    with one_thread(), tracking() as track:
         rows = list(track(measure(cells), "playing", len(cells)))
     command = shlex.join(["strainbench", *sys.argv[1:]])
     for table in tables(rows):
@@ -185,12 +185,13 @@ def keep_ledger(
     """Write what each scene models, and what each part of its physics changes in the answer."""
     from strainbench.bench.plan import plan
     from strainbench.studies.ledger import of_cloth, write_enough, write_ledger
+    from strainbench.studies.threads import one_thread
 
     names = scenarios or of_cloth()
     cells = plan(names, [solver], set_ or [], "simulate", steps, [tolerance], None)
     if enough and len(cells) != 1:
         raise ValueError(f"--enough: {len(cells)} scenes; one, with one value a setting, is valid")
-    with tracking() as track:
+    with one_thread(), tracking() as track:
         if enough:
             written = write_enough(cells[0], results, track)
         else:
@@ -210,11 +211,10 @@ def _record_all(cell: Cell, numbers: Sequence[int]) -> list[Problem]:
 
 def _recorded(cell: Cell, last: int, results: Path | None) -> Recording:
     """A scene's projections, those kept in a folder or, with times, those played now."""
-    from strainbench.bench.machine import fixed_threads
     from strainbench.bench.recording import record_all, recorded, recorder
 
     fed = recorder(cell)
-    with fixed_threads(1), playing(fed, last) as asked:
+    with playing(fed, last) as asked:
         if results is None:
             return record_all(fed, last, asked)
         return recorded(fed, last, results / "frames", asked)

@@ -23,7 +23,7 @@ from strainbench.document import Table
 from strainbench.files import open_folder
 from strainbench.progress import Track, untracked
 from strainbench.scenario.registry import find_scenario
-from strainbench.studies.program import watched, write_table
+from strainbench.studies.program import start, watched, write_table
 
 SHAPES = ("isotropic", "orthotropic", "anisotropic")
 HEADER = ("shape", "resolution", "other", "other_resolution", "hausdorff")
@@ -96,4 +96,4 @@ def run(
 
 
 if __name__ == "__main__":
-    typer.run(run)
+    start(run)

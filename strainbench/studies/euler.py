@@ -6,7 +6,6 @@ plays a cloth scene without projection, or with that of `--solver NAME`. Each st
 every linear solver in turn, so that they share whatever else the machine does; the first one's
 positions go on. Printed are medians over the steps: seconds a step, its split, and the ratio of the
 whole step to the assembly and factorisation in it; `-o FILE` writes them to a .md or .csv file too.
-OMP_NUM_THREADS=1 keeps each on one core.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ from strainbench.scenario.registry import find_scenario
 from strainbench.scenario.stage import Stage
 from strainbench.solver.registry import find_solver
 from strainbench.solver.solver import Solver
-from strainbench.studies.program import watched, write_table
+from strainbench.studies.program import start, watched, write_table
 
 HEADER = (
     *("solver", "converged", "iterations", "factor.", "evaluations", "step [ms]"),
@@ -159,4 +158,4 @@ def run(
 
 
 if __name__ == "__main__":
-    typer.run(run)
+    start(run)

@@ -34,7 +34,7 @@ from strainbench.render.polar import ANGLES, directional_stretches
 from strainbench.report.output import check_ending
 from strainbench.scenario.scenario import Scenario
 from strainbench.scenario.stage import Stage, StageError
-from strainbench.studies.program import watched, write_table
+from strainbench.studies.program import start, watched, write_table
 
 
 @dataclass(frozen=True)
@@ -123,4 +123,4 @@ def run(
 
 
 if __name__ == "__main__":
-    typer.run(run)
+    start(run)

@@ -16,15 +16,14 @@ from dataclasses import dataclass
 from time import perf_counter
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from strainbench.bench.machine import fixed_threads
 from strainbench.bench.recording import Recording
 from strainbench.document import Column, Prose, Table
 from strainbench.progress import Track, untracked
 from strainbench.solver.sections import Part, listening
 from strainbench.solver.solver import Solution, Solver, run_solver, warm_up
 from strainbench.studies.duel.measure import Factorisation
+from strainbench.studies.threads import one_thread
 
 PREPARE, SOLVE, REST = "prepare, once a mesh", "solve", "the rest"
 UNNAMED = Prose(
@@ -123,7 +122,7 @@ def profile(
     problem = recording.problem
     if refusal := solver.supports(problem):
         raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
-    with fixed_threads(1), threadpool_limits(1):
+    with one_thread():
         warm_up(solver, problem, tolerance)
         unit = Factorisation(problem)
         unit.take_turn()  # what its first one compiles or reads is no part of a unit

@@ -1,13 +1,14 @@
-"""What the studies that are programs of their own share: a bar, and the file of what they print."""
+"""What the studies that are programs share: their start, a bar, and the file of what they print."""
 
 from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import typer
 from rich.console import Console
 from rich.progress import track
 
@@ -16,6 +17,13 @@ from strainbench.document import Code, Document, Table
 from strainbench.report.machine import machine_section
 from strainbench.report.output import write_output
 from strainbench.report.provenance import remember_study
+from strainbench.studies.threads import one_thread
+
+
+def start(run: Callable[..., None]) -> None:
+    """Run a study's program on the words of the command line, on one thread."""
+    with one_thread():
+        typer.run(run)
 
 
 def watched(items: Iterable[Any], what: str, total: int) -> Iterable[Any]:

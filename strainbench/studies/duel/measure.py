@@ -24,10 +24,8 @@ from time import perf_counter, process_time
 from typing import Any, Protocol
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from strainbench.arrays import FloatArray
-from strainbench.bench.machine import fixed_threads
 from strainbench.bench.recording import Recording
 from strainbench.options import shown
 from strainbench.physics.linear import best_linear_solver
@@ -38,6 +36,7 @@ from strainbench.referee.reference import ReferenceSolver
 from strainbench.solver.solver import Solver, run_solver, warm_up
 from strainbench.studies.duel.racer import Racer, Rules
 from strainbench.studies.duel.trees import processes
+from strainbench.studies.threads import one_thread
 
 MOST_FRAMES = 100_000  # all their targets are in memory
 FACTORISATION, IMPLICIT_EULER = "factorisation + solve", "implicit Euler step"
@@ -104,11 +103,7 @@ def duel(
     for solver in solvers:
         if refusal := solver.supports(problem):
             raise ValueError(f"{solver.label} cannot take this scene: {refusal}")
-    with (
-        fixed_threads(1),
-        threadpool_limits(1),
-        _runners(solvers, problem, rules, against) as runners,
-    ):
+    with one_thread(), _runners(solvers, problem, rules, against) as runners:
         unit = Factorisation(problem) if units else None
         for repeat in range(repeats):
             turns = list(rotated(runners, repeat))

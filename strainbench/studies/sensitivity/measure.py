@@ -14,10 +14,8 @@ from dataclasses import dataclass, field
 from time import process_time
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from strainbench.arrays import FloatArray
-from strainbench.bench.machine import fixed_threads
 from strainbench.plugins import told
 from strainbench.problem.problem import Problem
 from strainbench.progress import Track, untracked
@@ -25,6 +23,7 @@ from strainbench.referee.certificate import Certificate, certify
 from strainbench.referee.reference import reference_of
 from strainbench.solver.solver import Solution, Solver, run_solver, warm_up
 from strainbench.studies.sensitivity.writings import AS_IT_IS, Writing, count, writings
+from strainbench.studies.threads import one_thread
 
 SEED = 0
 DRAWS = 20
@@ -115,7 +114,7 @@ def measure(
     found, reference = Sensitivity(problem), reference_of(problem)
     ways = writings(problem, draws, SEED)
     turns = ((solver, way) for way in ways for solver in solvers)
-    with fixed_threads(1), threadpool_limits(1):
+    with one_thread():
         for solver in solvers:
             warm_up(solver, problem, tolerance)
         for solver, way in track(turns, "projections", count(draws) * len(solvers)):

@@ -1,8 +1,7 @@
 """Run the study."""
 
-import typer
-
+from strainbench.studies.program import start
 from strainbench.studies.volumes.written import main
 
 if __name__ == "__main__":
-    typer.run(main)
+    start(main)
