@@ -181,11 +181,13 @@ class Running:
         return float(sum([*done, now][: len(begun)]) - sum(begun))
 
     def _memory_reached(self, now: float) -> str:
-        if _resident_mb(self.child.process.pid) > self.memory_limit_mb:
+        if (pid := self.child.process.pid) is None:  # not begun
+            return ""
+        if _resident_mb(pid) > self.memory_limit_mb:
             return f"{Ending.MEMORY_LIMIT} of {self.memory_limit_mb:g} MB"
         if now - self._counted > FAMILY_SECONDS:
             self._counted = now
-            if _family_mb(self.child.process.pid) > self.memory_limit_mb:
+            if _family_mb(pid) > self.memory_limit_mb:
                 return f"{Ending.MEMORY_LIMIT} of {self.memory_limit_mb:g} MB, with what it started"
         return ""
 
@@ -214,16 +216,14 @@ def crashed(code: int) -> str:
     return f"{Ending.CRASHED}: its process ended with exit code {code}{word}"
 
 
-def _resident_mb(pid: int | None) -> float:
-    if pid is None:  # not begun
-        return 0.0
+def _resident_mb(pid: int) -> float:
     try:
         return float(psutil.Process(pid).memory_info().rss / 1024**2)
     except psutil.Error:
         return 0.0
 
 
-def _family_mb(pid: int | None) -> float:
+def _family_mb(pid: int) -> float:
     """With what a process has started, counting what that shares with it once."""
     total = _resident_mb(pid)
     with suppress(psutil.Error):

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import psutil
 import pytest
 
 from strainbench.bench import isolation, judge
 from strainbench.bench.columns import STEP_COLUMNS
 from strainbench.bench.plan import from_file, plan
+from strainbench.bench.process import Child
 from strainbench.bench.records import STEPS, latest_runs, read_rows
 from strainbench.bench.runner import Observer, Runner, Settings
 from tests.processes import left_running, mark_what_starts
@@ -284,3 +289,14 @@ def test_the_summary_accounts_for_the_wall_time(tmp_path):
     assert 0 < summary.play < summary.wall
     assert 0 < summary.start < summary.wall
     assert 0 <= summary.overhead < 1
+
+
+def test_a_cell_that_has_not_begun_has_no_memory(tmp_path):
+    """Its nursery has not forked it yet: what other cells hold is not its own."""
+    (cell,) = plan(["swing"], ["none"], SMALL, "simulate", 1, [1e-6], None)
+    waiting = SimpleNamespace(pid=None, poll=lambda: None, stdin=None)
+    item = isolation.Running(cell, tmp_path, Child(waiting, "mark"), memory_limit_mb=0.0)
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as other:
+        assert psutil.Process(other.pid).memory_info().rss > 0
+        assert not item.has_ended()
+        other.kill()
