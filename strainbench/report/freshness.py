@@ -2,13 +2,14 @@
 
 `python -m strainbench.report.freshness results` prints them. Rows know the sources that
 they were measured with, and so do studies that keep a digest of them. Of others the checkout's
-history tells how many edits of what they measure came after them.
+history tells how many edits of what they measure came after them. Edits that change no number count
+in none, see `strainbench.report.history`.
 """
 
 from __future__ import annotations
 
+import csv
 import re
-import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -17,11 +18,15 @@ from typing import NamedTuple
 
 from strainbench.bench.records import MACHINES, RUNS, RecordsError, read_machines
 from strainbench.report.claims.written import CLAIMS
-from strainbench.report.provenance import ONLY_TELLS, made_with_this_code
+from strainbench.report.history import ENDED, git, texts_before
+from strainbench.report.provenance import ONLY_TELLS, made_with_this_code, study_files
 from strainbench.report.versions import changed_packages, shown_runs
 from strainbench.sources import PACKAGES, SUITE, TELLING
 
 FRESH = "as the code is now"
+RULE = """\
+An edit of words alone makes nothing older; one of what ends cells from outside,
+only folders with a cell that was ended so, its time limit apart."""
 NO_COMMAND = "none is known"
 OURS = r"(?:strainbench|make|python -m strainbench\S*|python -m pytest) [^`\n]*"
 STUDIES = {"converge": "convergence", "map": "stability"} | {
@@ -87,50 +92,54 @@ def age(folder: Path, commands: Sequence[str] = ()) -> list[str]:
         return [f"{count} of {len(rows)} cells {how}" for how, count in counts.items()]
     machines = read_machines(folder) if (folder / MACHINES).exists() else {}
     changes = dict.fromkeys(filter(None, map(changed_packages, machines.values())))
-    fresh = made_with_this_code(machines, [path.name for path in folder.glob("*.csv")])
+    files = [path.name for path in folder.glob("*.csv")]
+    fresh = made_with_this_code(machines, files, _has_ended_cells(folder))
     return [*([] if fresh else edits(folder, commands)), *changes]
 
 
+def _has_ended_cells(folder: Path) -> bool:
+    """Whether a table of a study tells of cells that were ended from outside."""
+    return any(
+        row.get("failure") in ENDED
+        for path in folder.glob("*.csv")
+        for row in csv.DictReader(path.read_text(encoding="utf-8").splitlines())
+    )
+
+
 def edits(folder: Path, commands: Sequence[str] = ()) -> list[str]:
-    """How many edits of what a study measures are newer than its oldest numbers."""
+    """How many edits of what a study measures are newer than its oldest numbers; of none, if they
+    changed no number."""
     numbers = sorted(folder.glob("*.csv")) or sorted(folder.glob("*.md"))
-    since = {
-        path: _git(folder, "log", "-1", "--format=%h %cs", "--", path.name) for path in numbers
-    }
+    since = {path: git(folder, "log", "-1", "--format=%h %cs", "--", path.name) for path in numbers}
     if not all(since.values()):
         return ["not known: its numbers stand in no history"]
-    left_out = [room for room in TELLING if room != "studies"] + _other_studies(commands)
+    studies = {path.stem for path in (SUITE / "studies").iterdir()}
+    called = _called(commands) or studies
+    watched = _has_ended_cells(folder)
+    measured = {file for study in called for file in study_files(study)}
+    others = (*sorted(studies - called), *(f"*/{file}" for file in ONLY_TELLS))
+    left_out = [room for room in TELLING if room != "studies"]
+    left_out += [f"studies/{name}*" for name in others]
     rooms = [f":(top,exclude){PACKAGES[0]}/{room}" for room in left_out]
     newer = {}
     for path, told in since.items():
-        base = f"{told.split()[0]}..HEAD"
+        base = told.split()[0]
         sources = (*(f":(top){name}" for name in PACKAGES), *rooms)
-        newer[path] = int(_git(folder, "rev-list", "--count", base, "--", *sources))
+        count = int(git(folder, "rev-list", "--count", f"{base}..HEAD", "--", *sources))
+        went = git(folder, "diff", "--name-only", "--diff-filter=D", base, "--", *sources)
+        same = not went and texts_before(base, measured, watched) is not None
+        newer[path] = 0 if same else count
     oldest = max(newer, key=lambda path: newer[path])
     when = since[oldest].split()[1]
     return [f"{newer[oldest]} edits since {oldest.name} of {when}"] if newer[oldest] else []
 
 
-def _other_studies(commands: Sequence[str]) -> list[str]:
-    """Studies that commands do not call, where they call some, and what only tells in any."""
+def _called(commands: Sequence[str]) -> set[str]:
+    """The studies that commands call."""
     words = [
         re.match(r"strainbench (\w+)|python -m strainbench\.studies\.(\w+)", c) for c in commands
     ]
-    called = {STUDIES.get(m[1], "") if m[1] else m[2] for m in words if m} - {""}
-    every = {path.stem for path in (SUITE / "studies").iterdir()}
-    others = sorted(every - called) if called else []
-    return [f"studies/{name}*" for name in (*others, *(f"*/{file}" for file in ONLY_TELLS))]
-
-
-def _git(folder: Path, *words: str) -> str:
-    """What git says in a folder; nothing where there is no git, or no checkout."""
-    try:
-        done = subprocess.run(
-            ["git", *words], cwd=folder, capture_output=True, text=True, check=False
-        )
-    except FileNotFoundError:
-        return ""
-    return done.stdout.strip() if done.returncode == 0 else ""
+    return {STUDIES.get(m[1], "") if m[1] else m[2] for m in words if m} - {""}
 
 
 def commands(readme: Path) -> dict[str, list[str]]:
@@ -172,6 +181,7 @@ def main(words: list[str]) -> None:
         raise SystemExit(f"strainbench.report.freshness: {error}") from None
     print("\n\n".join(map(str, found)))
     print(f"\n{sum(bool(s.older) for s in found)} of {len(found)} folders are older than the code.")
+    print(RULE)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 
 from strainbench.bench.records import MACHINES, read_machines, remember_machine
+from strainbench.report.history import alike
 from strainbench.sources import PACKAGES, ROOT, SUITE, TELLING, digest
 
 CODE = "code"
@@ -36,13 +37,14 @@ def remember_study(
 
 
 def made_with_this_code(
-    machines: Mapping[str, Mapping[str, object]], files: Iterable[str] = ()
+    machines: Mapping[str, Mapping[str, object]], files: Iterable[str] = (), watched: bool = False
 ) -> bool:
-    """Whether all digests, each beside any machine, are those of the sources as they are.
+    """Whether all digests, each beside any machine, are of sources that give what today's give.
 
     Parameters
     ----------
     files : of the folder, each of which needs one of its own where files were measured apart
+    watched : whether cells of the study were ended from outside, see `strainbench.report.history`
     """
     made = defaultdict[str, list[object]](list)
     for facts in machines.values():
@@ -51,7 +53,10 @@ def made_with_this_code(
     apart = {name.partition("/")[2] for name in made}
     if not made or ("" not in apart and set(files) - apart):
         return False
-    return all(code_digest(name.split("/")[0]) in of for name, of in made.items())
+    return all(
+        not alike(study_files(name.split("/")[0]), watched).isdisjoint(of)
+        for name, of in made.items()
+    )
 
 
 def _codes(facts: Mapping[str, object]) -> Iterable[tuple[str, object]]:
@@ -59,10 +64,21 @@ def _codes(facts: Mapping[str, object]) -> Iterable[tuple[str, object]]:
     return codes.items() if isinstance(codes, Mapping) else ()
 
 
-@cache
 def code_digest(study: str) -> str:
-    """Of all that a study may measure: the suite, its plug-ins, and the study itself."""
-    return digest(file for file in _sources() if _counts(file, study))
+    """Of all that a study may measure."""
+    return digest(study_files(study))
+
+
+@cache
+def study_files(study: str) -> tuple[Path, ...]:
+    """The suite, its plug-ins, and the study itself."""
+    return tuple(file for file in _sources() if _counts(file, study))
+
+
+@cache
+def suite_files() -> tuple[Path, ...]:
+    """What the digest of the suite in each row is of."""
+    return tuple(f for f in SUITE.rglob("*.py") if f.relative_to(SUITE).parts[0] not in TELLING)
 
 
 def _sources() -> Iterator[Path]:

@@ -1,8 +1,9 @@
 """Which rows of a results folder are shown: those of the code as it is now; what is said of others.
 
 Rows are about the same thing if scene, solver, settings and the files that they come from are the
-same. Of these the newest one is shown whose sources are as they are now; where there is none, the
-newest, which is then said to be older. The others stay in runs.csv.
+same. Of these the newest one is shown whose sources give what they give now, see
+`strainbench.report.history`; where there is none, the newest, which is then said to be older. The
+others stay in runs.csv.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from pathlib import Path
 from strainbench.bench.cell import content_of
 from strainbench.bench.machine import installed
 from strainbench.bench.records import Row, latest_runs, read_machines
-from strainbench.sources import ROOT, SUITE, suite_digest
+from strainbench.report.history import ENDED, alike
+from strainbench.report.provenance import suite_files
+from strainbench.sources import ROOT, SUITE, closure, plugin_files
 
 NOT_INSTALLED = "not installed"
 PLUGINS = ("scenario", "solver")
@@ -45,7 +48,8 @@ def shown_runs(folder: Path) -> list[Row]:
             kept[_subject(row)] = row
     for row in kept.values():
         name = row["machine"]
-        older = UNKNOWN if row["suite"] != suite_digest() else changes.get(name, "")
+        known = alike(suite_files(), watched=row["failure"] in ENDED)
+        older = UNKNOWN if row["suite"] not in known else changes.get(name, "")
         row["older"] = row["older"] or older
         threads = machines.get(name, {}).get("threads_per_solver", 1)
         row["threads"] = row["threads"] or str(threads)
@@ -87,7 +91,10 @@ def _older_source(row: Row, folder: Path, now: Callable[[str, tuple[str, ...]], 
         if here is None:
             return f"with {source}, which is gone"
         settings = json.loads(row[f"{name}_parameters"] or "{}").values()
-        if now(here, tuple(v for v in settings if isinstance(v, str))) != content:
+        if now(here, tuple(v for v in settings if isinstance(v, str))) == content:
+            continue
+        own = tuple(closure(*plugin_files(here), suite=False))
+        if _outside(source) or content not in alike(own, watched=False):
             return f"with {source} before its latest edit"
     return ""
 

@@ -9,7 +9,7 @@ import pytest
 
 from strainbench.bench.machine import PACKAGES, describe_machine, installed
 from strainbench.bench.records import RUNS, RecordsError, remember_machine
-from strainbench.report.freshness import FRESH, NO_COMMAND, age, commands, freshness, main
+from strainbench.report.freshness import FRESH, NO_COMMAND, RULE, age, commands, freshness, main
 from strainbench.report.provenance import CODE, _counts, code_digest, remember_study
 from strainbench.sources import SUITE
 from tests.report.test_versions import measure
@@ -58,6 +58,7 @@ def test_it_is_printed_with_commands_on_lines_of_their_own(root, capsys):
         "    strainbench run swing --steps 2",
         "",
         "0 of 1 folders are older than the code.",
+        *RULE.splitlines(),
     ]
 
 
