@@ -46,10 +46,9 @@ factorisations to a gap of 1e-6 at 60 cells, 1%: sigma's exponent 3 takes 12.8, 
 12, 8 no fewer; correctors 0, 1, 2, 3: 15.8, 13.2, 11.8, 11.0, the time being the same from 1 to 4,
 as each costs a solve; a first slack of 1e-2, 3e-3, 1e-3: 12.8, 13.0, 13.4; a first mu from 3 to 300
 times that of the optimum's objective makes less than one iteration of difference, one below it
-many. Candidates with violations of 5 to 16,000 take 13 to 45 from a nearer start, and 16 to 190
-from themselves. Warm, with slacks kept instead of widened it takes 11 to 17, and from the last
-positions unmoved 10 to 25, where it takes 7. Limits 10 times stricter than the gap, not 100, spare
-4 to 8% of the iterations; half of the last change 2 to 6% of the warm ones.
+many. Warm, with slacks kept instead of widened it takes 11 to 17, and from the last positions
+unmoved 10 to 25, where it takes 7. Limits 10 times stricter than the gap, not 100, spare 4 to 8% of
+the iterations; half of the last change 2 to 6% of the warm ones.
 
 Where the time goes, in units of one factorisation and solve, as it is printed by `strainbench
 profile swing --set resolution=60 --frame 20 --solver newton-ipm`: an iteration takes 1.83, of
