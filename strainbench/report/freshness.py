@@ -25,8 +25,8 @@ from strainbench.sources import PACKAGES, SUITE, TELLING
 
 FRESH = "as the code is now"
 RULE = """\
-An edit of words alone makes nothing older; one of what ends cells from outside,
-only folders with a cell that was ended so, its time limit apart."""
+Edits of comments, docstrings and layout do not count; nor do those of what ends
+cells from outside, but in folders with a cell that it ended for other than time."""
 NO_COMMAND = "none is known"
 OURS = r"(?:strainbench|make|python -m strainbench\S*|python -m pytest) [^`\n]*"
 STUDIES = {"converge": "convergence", "map": "stability"} | {

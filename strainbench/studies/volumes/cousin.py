@@ -214,8 +214,8 @@ BEAM_PART = Part(
     f"rest in steps of {1e3 * STEP:g} ms, damped at {ALPHA:g} / s, on 200 tetrahedra. Limits on "
     "principal stretches by the linearised step in the norm of its metric, upper limits on "
     "stretch projected in that of the masses, as convex methods take no other; they have no lower "
-    "limits. Times are thread times as ratios of means a step, of "
-    "which those need none whose candidate is within the limits.",
+    "limits. Each is played twice and timed the second time: thread times as ratios of means a "
+    "step, of which those need none whose candidate is within the limits.",
     [
         *("limits", "method"),
         *numbers(("tip x", "m", ".2f"), ("tip y", "m", ".2f"), ("‖F e_x‖", "", ".2f")),
