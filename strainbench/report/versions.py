@@ -19,7 +19,7 @@ from strainbench.bench.machine import installed
 from strainbench.bench.records import Row, latest_runs, read_machines
 from strainbench.report.history import ENDED, alike
 from strainbench.report.provenance import suite_files
-from strainbench.sources import ROOT, SUITE, closure, plugin_files
+from strainbench.sources import ROOT, SUITE, closure, plugin_files, suite_digest
 
 NOT_INSTALLED = "not installed"
 PLUGINS = ("scenario", "solver")
@@ -48,9 +48,7 @@ def shown_runs(folder: Path) -> list[Row]:
             kept[_subject(row)] = row
     for row in kept.values():
         name = row["machine"]
-        known = alike(suite_files(), watched=row["failure"] in ENDED)
-        older = UNKNOWN if row["suite"] not in known else changes.get(name, "")
-        row["older"] = row["older"] or older
+        row["older"] = row["older"] or _older_suite(row) or changes.get(name, "")
         threads = machines.get(name, {}).get("threads_per_solver", 1)
         row["threads"] = row["threads"] or str(threads)
         row["repeats"] = row["repeats"] or "1"
@@ -70,6 +68,14 @@ def _subject(row: Row) -> tuple[str, ...]:
 def _outside(source: str) -> str:
     """The path of a plug-in from outside, nothing for one of ours."""
     return source if os.path.isabs(source) else ""
+
+
+def _older_suite(row: Row) -> str:
+    """Whether the suite that a row was measured with may give other numbers now."""
+    if row["suite"] == suite_digest():  # history need not be asked
+        return ""
+    known = alike(suite_files(), watched=row["failure"] in ENDED)
+    return "" if row["suite"] in known else UNKNOWN
 
 
 def _older_source(row: Row, folder: Path, now: Callable[[str, tuple[str, ...]], str]) -> str:

@@ -118,6 +118,7 @@ def test_a_file_notes_the_sources_that_it_is_begun_with(tmp_path, monkeypatch):
     written.main("40", "2", "fig4", tmp_path)
     assert age(tmp_path) == []
     monkeypatch.setattr(provenance, "code_digest", lambda study: "another")
+    monkeypatch.setattr(provenance, "alike", lambda files, watched: {"another"})
     written.main("40,20", "2", "fig4", tmp_path)
     assert age(tmp_path) == ["not known: its numbers stand in no history"]
     (tmp_path / "fig4.csv").unlink()
