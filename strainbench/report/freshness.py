@@ -25,8 +25,9 @@ from strainbench.sources import PACKAGES, SUITE, TELLING
 
 FRESH = "as the code is now"
 RULE = """\
-Edits of comments, docstrings and layout do not count; nor do those of what ends
-cells from outside, but in folders with a cell that it ended for other than time."""
+In a checkout with its history edits of comments, docstrings and layout do not
+count; nor do those of what ends cells from outside, but in folders with a cell
+that it ended for other than time."""
 NO_COMMAND = "none is known"
 OURS = r"(?:strainbench|make|python -m strainbench\S*|python -m pytest) [^`\n]*"
 STUDIES = {"converge": "convergence", "map": "stability"} | {
@@ -111,7 +112,8 @@ def edits(folder: Path, commands: Sequence[str] = ()) -> list[str]:
     changed no number."""
     numbers = sorted(folder.glob("*.csv")) or sorted(folder.glob("*.md"))
     since = {path: git(folder, "log", "-1", "--format=%h %cs", "--", path.name) for path in numbers}
-    if not all(since.values()):
+    shallow = git(folder, "rev-parse", "--is-shallow-repository") == "true"
+    if shallow or not all(since.values()):
         return ["not known: its numbers stand in no history"]
     studies = {path.stem for path in (SUITE / "studies").iterdir()}
     called = _called(commands) or studies

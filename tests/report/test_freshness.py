@@ -86,6 +86,20 @@ def test_a_study_is_held_against_the_history_of_its_code(tmp_path):
         assert [told.split(" edits since a.csv")[0] for told in age(study)] == [str(edits)][:edits]
 
 
+def test_a_clone_of_the_last_commit_alone_has_no_history(tmp_path):
+    study = tmp_path / "whole/results/study"
+    study.mkdir(parents=True)
+    (study / "a.csv").write_text("a\n1\n")
+    git(tmp_path, "init", "-q", "whole")
+    for message in ("measured", "later"):
+        (tmp_path / "whole/README.md").write_text(message)
+        git(tmp_path / "whole", "add", "-A")
+        git(tmp_path / "whole", "commit", "-qm", message)
+    git(tmp_path, "clone", "-q", "--depth", "1", (tmp_path / "whole").as_uri(), "last")
+    assert age(study) == []
+    assert age(tmp_path / "last/results/study") == ["not known: its numbers stand in no history"]
+
+
 def test_of_studies_those_count_that_the_commands_of_a_folder_call(tmp_path):
     study = tmp_path / "results/study"
     study.mkdir(parents=True)
