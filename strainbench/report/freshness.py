@@ -94,8 +94,9 @@ def age(folder: Path, commands: Sequence[str] = ()) -> list[str]:
     machines = read_machines(folder) if (folder / MACHINES).exists() else {}
     changes = dict.fromkeys(filter(None, map(changed_packages, machines.values())))
     files = [path.name for path in folder.glob("*.csv")]
-    fresh = made_with_this_code(machines, files, _has_ended_cells(folder))
-    return [*([] if fresh else edits(folder, commands)), *changes]
+    watched = _has_ended_cells(folder)
+    fresh = made_with_this_code(machines, files, watched)
+    return [*([] if fresh else _edits(folder, commands, watched)), *changes]
 
 
 def _has_ended_cells(folder: Path) -> bool:
@@ -107,7 +108,7 @@ def _has_ended_cells(folder: Path) -> bool:
     )
 
 
-def edits(folder: Path, commands: Sequence[str] = ()) -> list[str]:
+def _edits(folder: Path, commands: Sequence[str], watched: bool) -> list[str]:
     """How many edits of what a study measures are newer than its oldest numbers; of none, if they
     changed no number."""
     numbers = sorted(folder.glob("*.csv")) or sorted(folder.glob("*.md"))
@@ -117,7 +118,6 @@ def edits(folder: Path, commands: Sequence[str] = ()) -> list[str]:
         return ["not known: its numbers stand in no history"]
     studies = {path.stem for path in (SUITE / "studies").iterdir()}
     called = _called(commands) or studies
-    watched = _has_ended_cells(folder)
     measured = {file for study in called for file in study_files(study)}
     others = (*sorted(studies - called), *(f"*/{file}" for file in ONLY_TELLS))
     left_out = [room for room in TELLING if room != "studies"]

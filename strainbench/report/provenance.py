@@ -78,7 +78,7 @@ def study_files(study: str) -> tuple[Path, ...]:
 @cache
 def suite_files() -> tuple[Path, ...]:
     """What the digest of the suite in each row is of."""
-    return tuple(f for f in SUITE.rglob("*.py") if f.relative_to(SUITE).parts[0] not in TELLING)
+    return tuple(file for file in study_files("") if file.is_relative_to(SUITE))
 
 
 def _sources() -> Iterator[Path]:
